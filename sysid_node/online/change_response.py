@@ -47,7 +47,7 @@ def _change_tests(state: EstimatorState) -> ChangeTests:
     model = state.model
     return ChangeTests(
         model.equations,
-        state.line_model,
+        state.controls.line_model,
         model.spectrum,
         state.changes.monitor,
         state.transform.last,

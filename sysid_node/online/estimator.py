@@ -33,6 +33,7 @@ from sysid_node.online.segment_update import begin_segment, reach, renew
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.state import (
     ChangeWatch,
+    ControlLines,
     EstimatorModel,
     EstimatorState,
     FinishedSegments,
@@ -71,9 +72,11 @@ def init(
         SampledTransform(layout, transform),
         equations,
         flow_angle_filter.init(aircraft),
-        model.instrument_model,
-        imperfect.applied if imperfect else None,
-        ServoStates([0.0] * len(layout.timed)) if imperfect and imperfect.controls else None,
+        ControlLines(
+            servos=imperfect.applied if imperfect else None,
+            states=ServoStates([0.0] * len(layout.timed)) if imperfect and imperfect.controls else None,
+            line_model=model.instrument_model,
+        ),
         FinishedSegments(information.nothing(layout, grid.count if imperfect else 0)),
         ChangeWatch(no_excited_segments(equations, layout)),
     )
@@ -130,7 +133,7 @@ def begin_with_commands(state: EstimatorState, time: float) -> EstimatorState:
     fresh = init(model.aircraft, model.settings, commanded=True, command_interval=model.sample.command_interval)
     fresh.transform.transform.last = time
     fresh.flow, fresh.inputs.begin = state.flow, state.inputs.begin
-    if fresh.servo_states is not None:
+    if fresh.controls.states is not None:
         fresh.inputs.begin = max(state.inputs.begin, time + SERVOS_SETTLE)
     fresh.inputs.thrust_known, fresh.inputs.incomplete = state.inputs.thrust_known, state.inputs.incomplete
     return fresh
@@ -181,8 +184,8 @@ def _append(state: EstimatorState, time: float, sample: Sequence[float], excess:
     inputs.previous = (time, motion)
     if previous is None or time - previous[0] > model.settings.max_gap:
         interrupt(state)  # before the servos move on
-        if state.servo_states is not None:
-            state.servo_states.follow(time, row[model.layout.deflections])
+        if state.controls.states is not None:
+            state.controls.states.follow(time, row[model.layout.deflections])
         sampled_transform.begin_at(state.transform, time, row)
         begin_segment(state)
         return
@@ -191,8 +194,9 @@ def _append(state: EstimatorState, time: float, sample: Sequence[float], excess:
     extra = [row[OFFSET] * excess[i] for i in model.sample.timed] if excess else ()
     if extra:
         gain += [inputs.step * part for part in extra]
-    if state.servo_states is not None:
-        state.servo_states.follow(time, row[model.layout.deflections], extra)
+    servos = state.controls.states
+    if servos is not None:
+        servos.follow(time, row[model.layout.deflections], extra)
     sampled_transform.append(state.transform, time, row, gain)
     state.segment.samples += 1
     state.segment.intervals += sample[INTERVAL]
@@ -213,10 +217,11 @@ def _follow_uncounted(state: EstimatorState, time: float, sample: Sequence[float
     """Let the servos follow a sample that does not count, so that they are where they are when samples begin to."""
     V, density = sample[AIRSPEED], sample[DENSITY]
     controls = [sample[len(SAMPLE_COLUMNS) + i] for i in state.model.sample.timed]
-    if state.servo_states is not None and math.isfinite(V * density * math.fsum(controls)):
+    servos = state.controls.states
+    if servos is not None and math.isfinite(V * density * math.fsum(controls)):
         reference = state.model.aircraft.reference
         k = density * V * V / (reference.air_density * reference.airspeed**2)
-        state.servo_states.follow(time, [k * control for control in controls])
+        servos.follow(time, [k * control for control in controls])
 
 
 def renew_early(state: EstimatorState) -> None:

@@ -21,13 +21,13 @@ AFTER = 0.2  # s of data after which a renewal counts
 def begin(state: EstimatorState, whole: bool, work: Callable[[EstimatorState], Steps[None]]) -> None:
     """Begin ``work`` on a copy of the estimator; ``whole``: whether the segment ends here."""
     time, segment, at_rest = state.transform.last, state.segment, sampled_transform.at_rest(state.transform)
-    servo_states = None if state.servo_states is None else state.servo_states.copy()
+    controls, servos = state.controls, state.controls.states
     # What only renewals use is not copied. Nothing else changes or reads it before the end of this one.
     copy = replace(
         state,
         transform=at_rest,
         segment=replace(segment),
-        servo_states=servo_states,
+        controls=controls if servos is None else replace(controls, states=servos.copy()),
     )
     lines = sampled_transform.current(at_rest)
     counts = segment.samples, segment.intervals
@@ -56,19 +56,20 @@ def complete(state: EstimatorState) -> None:
 
 def _take_over(state: EstimatorState, pending: PendingRenewal) -> None:
     """Take over what the renewal found."""
-    copy, moved = pending.copy, pending.copy.servos is not state.servos
+    copy, states, found = pending.copy, state.controls.states, pending.copy.controls.states
+    moved = copy.controls.servos is not state.controls.servos
     if not pending.whole:
         _take_over_segment(state, pending, moved)
-    elif moved and copy.servo_states is not None:
-        state.segment.first_servos = copy.servo_states.copy()
-        state.segment.first_impulses = copy.servo_states.impulses(state.model.spectrum.omega, pending.time)
-    if moved and state.servo_states is not None and copy.servo_states is not None:
-        for sample in state.servo_states.recent:
+    elif moved and found is not None:
+        state.segment.first_servos = found.copy()
+        state.segment.first_impulses = found.impulses(state.model.spectrum.omega, pending.time)
+    if moved and states is not None and found is not None:
+        for sample in states.recent:
             if sample[0] > pending.time:
-                copy.servo_states.follow(*sample)
-        state.servo_states = copy.servo_states
+                found.follow(*sample)
+        states = found
     state.equations, state.latest = copy.equations, copy.latest
-    state.servos, state.line_model = copy.servos, copy.line_model
+    state.controls = replace(copy.controls, states=states)
     state.pending = None
 
 

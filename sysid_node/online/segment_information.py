@@ -55,11 +55,11 @@ def information_of(state: EstimatorState, lines: Array, begin: float, end: float
     """The information in the transform ``lines`` of begin..end (s), with cross-spectra where not all is exact."""
     model, layout = state.model, state.model.layout
     if model.imperfections is None:
-        clean = information.clean_lines(lines, state.line_model)
+        clean = information.clean_lines(lines, state.controls.line_model)
         return information.measure_clean(clean, lines[-1], model.spectrum, begin, end)
     edges = information.edges(model.spectrum.omega, begin, end)
     clean = information.clean_lines_and_rates(
-        lines, state.line_model, edges, model.spectrum.omega, layout.differentiated
+        lines, state.controls.line_model, edges, model.spectrum.omega, layout.differentiated
     )
     info = information.measure_clean(clean[:, : layout.width], lines[-1], model.spectrum, begin, end, edges)
     info.spectra = cross_spectra.cross_spectra(np.delete(clean, np.s_[layout.transformed : layout.width], axis=1))

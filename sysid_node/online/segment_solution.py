@@ -26,7 +26,16 @@ from sysid_node.online.regression.least_squares import InstrumentStrength, Solut
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.regression.selection_bias import selection_bias_factors
 from sysid_node.online.segment_information import finished_information, line_seconds, measure_segment
-from sysid_node.online.state import EstimatorState, FinishedSums, InstrumentChecks, ModelTests, SegmentSolution, Steps
+from sysid_node.online.state import (
+    ControlLines,
+    EstimatorState,
+    FinishedSums,
+    InstrumentChecks,
+    LaterEstimates,
+    ModelTests,
+    SegmentSolution,
+    Steps,
+)
 from sysid_node.online.systematic import estimation
 from sysid_node.online.systematic.corrected_signals import CorrectedSignals, corrected_signals, known_changes
 from sysid_node.online.systematic.estimation import CorrectedSolution, SystematicErrors
@@ -43,9 +52,9 @@ def solve_with_servos(state: EstimatorState, lines: Array) -> Steps[None]:
     imperfect = state.model.imperfections
     for changes in range(SERVO_STEPS + 1):
         found = yield from look(state, lines)
-        if imperfect is None or state.servos is None or found is None or changes == SERVO_STEPS:
+        if imperfect is None or state.controls.servos is None or found is None or changes == SERVO_STEPS:
             return
-        step = estimation.notable_step(imperfect, state.servos, found)
+        step = estimation.notable_step(imperfect, state.controls.servos, found)
         if step is None:
             return
         yield from move_servos(state, step)
@@ -73,7 +82,7 @@ def _look_at(
     state: EstimatorState, lines: Array, place: SystematicErrors, share: float
 ) -> Steps[SystematicErrors | None]:
     """Renew the estimates with the signals corrected as in ``place``, and a ``share`` of the step from there."""
-    if state.servos is not place.lines:
+    if state.controls.servos is not place.lines:
         yield from move_servos(state, place.lines)
     else:
         state.changes.monitor.references.pop()
@@ -88,18 +97,19 @@ def last_errors(state: EstimatorState) -> SystematicErrors | None:
 
 def move_servos(state: EstimatorState, servos: ServoModel) -> Steps[None]:
     """Replace the controls by what these servos make of them, in all that is remembered."""
-    model, imperfect, before = state.model, state.model.imperfections, state.servos
+    model, imperfect, before = state.model, state.model.imperfections, state.controls.servos
     assert imperfect is not None
     assert before is not None
-    state.servos = servos
-    if state.servo_states is not None:
-        state.servo_states = state.servo_states.moved(servos.lateness.tolist())
+    states = state.controls.states
+    state.controls = ControlLines(
+        servos,
+        None if states is None else states.moved(servos.lateness.tolist()),
+        line_model(model.instrument_model, model.layout, model.spectrum.omega, servos, imperfect.applied),
+    )
     first = state.segment.first_servos
     if first is not None:
         state.segment.first_servos = first.moved(servos.lateness.tolist())
         state.segment.first_impulses = state.segment.first_servos.impulses(model.spectrum.omega, first.time)
-    state.line_model = line_model(model.instrument_model, model.layout, model.spectrum.omega, servos, imperfect.applied)
-
     finished, found = state.finished, {}
     kept = [info for _, info in finished.in_window]
     kept += [segment.information for excited in state.changes.excited for segment in excited.segments]
@@ -160,10 +170,12 @@ def solve_all(
         total=total,
         solution=before.solution,
         uncertainty=spread,
-        compensation=found.compensation,
         finished=FinishedSums(past.grams.sum(axis=0), past.integrals),
-        trim_noise=spread.bands[:, 0] * total.energy,
-        factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
+        later=LaterEstimates(
+            found.compensation,
+            trim_noise=spread.bands[:, 0] * total.energy,
+            factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
+        ),
         instruments=found.instruments,
         tests=_model_tests(state, found.solution, spread, gram, systematic),
         systematic=systematic,
@@ -186,7 +198,7 @@ def _corrected_signals(
     state: EstimatorState, recorded: Information, taken_out: Array | None
 ) -> Steps[CorrectedSignals | None]:
     """The signals without what is so far estimated of the imperfections, or is to be taken out; None where none are."""
-    model, servos = state.model, state.servos
+    model, servos = state.model, state.controls.servos
     if model.imperfections is None or servos is None:
         return None
     last = last_errors(state)
@@ -218,7 +230,7 @@ def _systematic(
 
     With a ``share`` of a step they are looked at anew, else when it is time.
     """
-    imperfect, servos, equations = state.model.imperfections, state.servos, state.equations
+    imperfect, servos, equations = state.model.imperfections, state.controls.servos, state.equations
     if imperfect is None or servos is None or signals is None or not corrected.solution.usable:
         return None
     correction = signals.correction(equations, corrected.solution, recorded)

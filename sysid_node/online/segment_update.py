@@ -86,8 +86,10 @@ def _count_segment_in(state: EstimatorState, lines: Array) -> None:
     """Let estimates hold the segment that ends here until its last renewal is done."""
     latest, model = state.latest, state.model
     if latest is not None:
-        impulses = edges(model.spectrum.omega, state.segment.start, state.transform.last) if state.servos else None
-        gram = latest.finished.gram + products(lines.copy(), state.line_model, impulses)
+        impulses = (
+            edges(model.spectrum.omega, state.segment.start, state.transform.last) if state.controls.servos else None
+        )
+        gram = latest.finished.gram + products(lines.copy(), state.controls.line_model, impulses)
         latest.finished = FinishedSums(gram, latest.finished.integrals + lines[-1])
 
 
@@ -95,8 +97,8 @@ def begin_segment(state: EstimatorState) -> None:
     """Begin a segment, of which alone the transform is, and a piece of the change monitor at the last sample."""
     time, segment = state.transform.last, state.segment
     sampled_transform.restart(state.transform)
-    if state.servo_states is not None:
-        segment.first_servos = state.servo_states.copy()
+    if state.controls.states is not None:
+        segment.first_servos = state.controls.states.copy()
         segment.first_impulses = segment.first_servos.impulses(state.model.spectrum.omega, time)
     segment.start, segment.samples, segment.intervals = time, 0, 0.0
     segment.noise_moments, segment.noise_measured_until = NoiseMoments(), time

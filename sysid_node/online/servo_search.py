@@ -68,8 +68,8 @@ def try_another_solution(state: EstimatorState) -> Steps[None]:
 def _elsewhere(state: EstimatorState, found: SystematicErrors, control: int) -> Steps[EstimatorState | None]:
     """A copy that has gone on from where one servo is on the other side; None where nothing is found there."""
     imperfect = state.model.imperfections
-    assert imperfect is not None and state.servos is not None
-    at, late = int(imperfect.timed[control]), state.servos.lateness
+    assert imperfect is not None and state.controls.servos is not None
+    at, late = int(imperfect.timed[control]), state.controls.servos.lateness
     trial = replace(
         state,
         segment=replace(state.segment),
@@ -79,8 +79,8 @@ def _elsewhere(state: EstimatorState, found: SystematicErrors, control: int) -> 
     there = LATE if late[at] < BETWEEN else 0.0
     by_lateness, by_curvature = np.zeros(late.size), np.zeros(late.size)
     by_lateness[at] = there - late[at]
-    by_curvature[at] = CURVATURE * there**2 - state.servos.curvature[at]
-    servos = state.servos.moved(by_lateness, by_curvature)
+    by_curvature[at] = CURVATURE * there**2 - state.controls.servos.curvature[at]
+    servos = state.controls.servos.moved(by_lateness, by_curvature)
     taken_out = estimation.to_take_out(imperfect, servos, found)
     for order in range(3):
         taken_out[imperfect.servos.start + order * len(imperfect.controls) + control] = 0.0
@@ -93,9 +93,9 @@ def _elsewhere(state: EstimatorState, found: SystematicErrors, control: int) -> 
             there_found = segment_solution.last_errors(trial)
         else:
             there_found = yield from segment_solution.look(trial, lines)
-        if there_found is None or trial.servos is None:
+        if there_found is None or trial.controls.servos is None:
             return None
-        step = estimation.notable_step(imperfect, trial.servos, there_found)
+        step = estimation.notable_step(imperfect, trial.controls.servos, there_found)
         if step is None or not left:
             break
         servos = step
@@ -123,9 +123,9 @@ def _improbability(state: EstimatorState, found: SystematicErrors, own: Fit, oth
 
 def _take(state: EstimatorState, trial: EstimatorState) -> Steps[None]:
     """Go on with the solution of a ``trial``."""
-    assert trial.servos is not None
-    if trial.servos is not state.servos:
-        yield from segment_solution.move_servos(state, trial.servos)
+    assert trial.controls.servos is not None
+    if trial.controls.servos is not state.controls.servos:
+        yield from segment_solution.move_servos(state, trial.controls.servos)
     state.equations, state.latest = trial.equations, trial.latest
     state.segment.information = trial.segment.information
     state.changes.monitor.references.append(trial.changes.monitor.references[-1])

@@ -130,6 +130,15 @@ class ModelTests:
     contradicted: NDArray[np.bool_]  # (C,) coefficients whose estimates the last seconds contradict
 
 
+@dataclass(frozen=True)
+class LaterEstimates:
+    """What estimates until the next renewal take from this one."""
+
+    compensation: Array | None  # noise's part of the normal equations, see ``least_squares.bias_of``
+    trim_noise: Array  # (C,) squared error of the coefficients' integrals
+    factors: Array  # (C, P) squared standard error over (P_jj residual)
+
+
 @dataclass
 class SegmentSolution:
     """What ``renew`` last found; the estimates use it until the next renewal."""
@@ -139,10 +148,8 @@ class SegmentSolution:
     total: Information
     solution: Solution
     uncertainty: Uncertainty
-    compensation: Array | None  # noise's part of the normal equations, see ``least_squares.bias_of``
     finished: FinishedSums
-    trim_noise: Array  # (C,) squared error of the coefficients' integrals
-    factors: Array  # (C, P) squared standard error over (P_jj residual)
+    later: LaterEstimates
     instruments: InstrumentChecks
     tests: ModelTests
     systematic: SystematicErrors | None = None  # None where all is exact
@@ -206,6 +213,15 @@ class EstimatorInputs:
     thrust_known: bool | None = None  # whether the first sample had one; None = none has come yet
 
 
+@dataclass(frozen=True)
+class ControlLines:
+    """Where the transform's lines have the controls."""
+
+    servos: ServoModel | None  # of the controls; None where all is exact
+    states: ServoStates | None  # where those servos are now; None where no control is late
+    line_model: InstrumentModel | None  # what is computed from the lines: the controls' servos, instruments
+
+
 @dataclass
 class EstimatorState:
     """All that the estimator remembers."""
@@ -214,9 +230,7 @@ class EstimatorState:
     transform: SampledTransform  # of the present segment
     equations: NormalEquations  # the model's, with least squares where instruments are weak
     flow: FlowAngleFilter  # of the flow angles that are not measured
-    line_model: InstrumentModel | None  # what is computed from the transform's lines: the controls' servos, instruments
-    servos: ServoModel | None  # of the controls, as the lines have them; None where all is exact
-    servo_states: ServoStates | None  # None where no control is late
+    controls: ControlLines
     finished: FinishedSegments
     changes: ChangeWatch
     inputs: EstimatorInputs = field(default_factory=EstimatorInputs)
@@ -253,10 +267,11 @@ def completed(steps: Steps[T]) -> T:
 def current_lines(state: EstimatorState) -> Array:
     """(2F + 1, W) the transform of the present segment up to the last sample, with the servos' impulses."""
     lines = sampled_transform.current(state.transform)
-    if state.servo_states is not None and state.segment.first_impulses.size:
+    servos = state.controls.states
+    if servos is not None and state.segment.first_impulses.size:
         model, time = state.model, state.transform.last
         first = state.segment.first_impulses
         if model.spectrum.rate:
             first = first * math.exp(0.5 * model.spectrum.rate * (state.segment.start - time))
-        lines[:, model.layout.rates] += state.servo_states.impulses(model.spectrum.omega, time) - first
+        lines[:, model.layout.rates] += servos.impulses(model.spectrum.omega, time) - first
     return lines

@@ -47,9 +47,10 @@ def test_steps_with_the_samples_that_follow_find_what_is_found_at_once(flown, se
     assert waited > 50  # samples came while a renewal was under way
     one, other = spread.latest, at_once.latest
     assert one is not None and other is not None and one.systematic is not None and other.systematic is not None
-    assert spread.servos is not None and spread.servos.lateness.max() > 0.03  # a servo has moved
+    servos = spread.controls.servos
+    assert servos is not None and servos.lateness.max() > 0.03  # a servo has moved
     np.testing.assert_allclose(one.solution.theta, other.solution.theta, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(one.factors, other.factors, rtol=1e-9)
+    np.testing.assert_allclose(one.later.factors, other.later.factors, rtol=1e-9)
     np.testing.assert_allclose(one.systematic.servos.lateness, other.systematic.servos.lateness, rtol=1e-9, atol=1e-12)
     found, expected = estimate(spread).derivatives, estimate(at_once).derivatives
     for name, row in expected.items():

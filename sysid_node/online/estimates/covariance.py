@@ -66,7 +66,7 @@ def _statistical_correlation(state: EstimatorState, latest: SegmentSolution) -> 
         slopes = _with_prior(state, slopes)
     covariance[:, :P, :P] = slopes
     covariance[:, P, :P] = covariance[:, :P, P] = -(slopes @ x)
-    noise = latest.trim_noise / (weight * weight) if weight else latest.trim_noise
+    noise = latest.later.trim_noise / (weight * weight) if weight else latest.later.trim_noise
     covariance[:, P, P] = slopes @ x @ x + noise
     deviation = np.sqrt(np.maximum(covariance.diagonal(axis1=1, axis2=2), 0.0))
     deviation[deviation == 0.0] = np.inf

@@ -37,10 +37,10 @@ def current_solution(state: EstimatorState) -> CurrentSolution | None:
         return None
     lines, time = current_lines(state), state.transform.last
     integrals = latest.finished.integrals + lines[-1]
-    impulses = edges(state.model.spectrum.omega, state.segment.start, time) if state.servos else None
-    gram = products(lines, state.line_model, impulses)
+    impulses = edges(state.model.spectrum.omega, state.segment.start, time) if state.controls.servos else None
+    gram = products(lines, state.controls.line_model, impulses)
     gram += latest.finished.gram
-    growth, noise = growth_since(latest, time), latest.compensation
+    growth, noise = growth_since(latest, time), latest.later.compensation
     solution = least_squares.solve(equations, gram, None if noise is None else noise * growth)
     size = np.abs(solution.inverse.diagonal())
     slopes = solution.theta.T
@@ -64,7 +64,7 @@ def slope_variances(latest: SegmentSolution, residual: Array, size: Array, growt
     ``residual`` (C,) and ``size`` (P,): of the present solution; ``growth``: see ``growth_since``.
     """
     variances: Array = residual[:, None].dot(size[None] / growth)
-    variances *= latest.factors
+    variances *= latest.later.factors
     return variances
 
 
@@ -97,4 +97,4 @@ def _offsets(
     left = y - slopes.dot(x)[:, 0]
     # x' covariance x
     spread = latest.uncertainty.covariance.reshape(C * P, P).dot(x).reshape(C, P).dot(x)[:, 0]
-    return left / weight, (spread + latest.trim_noise) / weight / weight
+    return left / weight, (spread + latest.later.trim_noise) / weight / weight

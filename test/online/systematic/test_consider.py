@@ -54,8 +54,8 @@ def test_where_servos_go_in_a_gap_is_not_of_the_segment_before_it():
     ends = []
     for gap in (None, 0.3, 2.0):
         state = estimator.init(aircraft, OnlineSettings(), commanded=True)
-        assert state.servos is not None
-        completed(move_servos(state, state.servos.moved(np.full(3, 0.05), np.zeros(3))))
+        assert state.controls.servos is not None
+        completed(move_servos(state, state.controls.servos.moved(np.full(3, 0.05), np.zeros(3))))
         for moment, sample in zip(time[:count].tolist(), samples[0][:count].tolist(), strict=True):
             estimator.update(state, moment, sample)
         if gap is None:
