@@ -170,7 +170,7 @@ def _shared_split(rows: Sequence[tuple[str, float, float]]) -> _SplitSizes:
     if len(tails) == 1:  # the type's part cannot be told from the tail's
         return _SplitSizes(Size(fit.mean, fit.lower, fit.upper), {tails[0]: Size(fit.mean, fit.lower, fit.upper)}, {})
     t = float(stats.t.ppf(0.975, len(tails) - 1))
-    total = {name: _around(fit.level[j], t * fit.level_error[j]) for j, name in enumerate(tails)}
+    total = {name: _around(fit.by_tail.level[j], t * fit.by_tail.level_error[j]) for j, name in enumerate(tails)}
     own = {name: _own_part(fit, j, t) for j, name in enumerate(tails)}
     return _SplitSizes(Size(fit.mean, fit.lower, fit.upper), total, own)
 
@@ -181,13 +181,13 @@ def _own_part(fit: RandomEffects, j: int, t: float) -> Size:
     At a scatter of zero no tail could differ, which few tails cannot show: the interval is therefore the hull of that
     at the estimated scatter and that at the upper end of its 95 % interval.
     """
-    deviation, variance = float(fit.own[j] - fit.mean), float(fit.own_error[j] ** 2)
+    deviation, variance = float(fit.by_tail.own[j] - fit.mean), float(fit.by_tail.own_error[j] ** 2)
     ends = []
     for scatter in (fit.tails.value, fit.tails.upper):
         kept = scatter**2 / (scatter**2 + variance)
         half = t * np.sqrt(kept * variance + kept**2 * fit.mean_error**2)
         ends += [kept * deviation - half, kept * deviation + half]
-    return Size(float(fit.level[j] - fit.mean), float(min(ends)), float(max(ends)))
+    return Size(float(fit.by_tail.level[j] - fit.mean), float(min(ends)), float(max(ends)))
 
 
 def _around(value: float, half: float) -> Size:

@@ -54,12 +54,14 @@ def _apart(series: DerivativeSeries, fit: RandomEffects) -> tuple[Array, Array, 
         return np.full(J, np.nan), np.full(J, np.nan), np.full(J, np.nan)
     omega = float(np.nan_to_num(fit.flights.value))
     tau = scatter_of_others(series.value, series.statistical, series.systematic, series.tail, omega)
-    variance = tau[:, None] ** 2 + fit.own_error**2  # (J, J): of each tail's own mean, one tail left out in each row
+    variance = (
+        tau[:, None] ** 2 + fit.by_tail.own_error**2
+    )  # (J, J): of each tail's own mean, one tail left out in each row
     weight = (1.0 - np.eye(J)) / variance
-    others = weight @ fit.own / weight.sum(axis=1)
-    spread = (weight * (fit.own - others[:, None]) ** 2).sum(axis=1) / (J - 2)
+    others = weight @ fit.by_tail.own / weight.sum(axis=1)
+    spread = (weight * (fit.by_tail.own - others[:, None]) ** 2).sum(axis=1) / (J - 2)
     others_variance = np.maximum(spread, 1.0) / weight.sum(axis=1)
-    distance, error = fit.own - others, np.sqrt(np.diag(variance) + others_variance)
+    distance, error = fit.by_tail.own - others, np.sqrt(np.diag(variance) + others_variance)
     return distance, error, np.asarray(2.0 * stats.t.sf(np.abs(distance) / error, J - 2))
 
 

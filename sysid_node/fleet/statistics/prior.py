@@ -50,12 +50,17 @@ def tail_prior(population: Population, tail: str, drift: Drift | None) -> TailPr
     """
     fit = population.fit
     j = population.series.tails.index(tail)
-    value, variance = float(fit.level[j]), float(fit.level_error[j] ** 2 + np.nan_to_num(fit.flights.value) ** 2)
+    value, variance = (
+        float(fit.by_tail.level[j]),
+        float(fit.by_tail.level_error[j] ** 2 + np.nan_to_num(fit.flights.value) ** 2),
+    )
     if drift is not None:
         value += drift.change * float(drift.course[-1])
         variance += drift.error**2
     count = int((population.series.tail == j).sum())
-    return TailPrior(value, float(np.sqrt(variance)), float(fit.systematic[j]), float(fit.shrinkage[j]), count)
+    return TailPrior(
+        value, float(np.sqrt(variance)), float(fit.by_tail.systematic[j]), float(fit.by_tail.shrinkage[j]), count
+    )
 
 
 def tail_aircraft(file: Aircraft, tail: str, priors: Mapping[str, TailPrior]) -> Aircraft:

@@ -43,14 +43,23 @@ class Scatter:
 
 
 @dataclass(frozen=True)
+class TailEffects:
+    """What is found of each of J tails."""
+
+    own: Array  # (J,) mean of the tail's flights alone
+    own_error: Array  # (J,) its standard error: scatter of flights included, systematic errors not
+    level: Array  # (J,) empirical Bayes estimate
+    level_error: Array  # (J,) its standard error without systematic errors
+    shrinkage: Array  # (J,) weight of the type's mean in it
+    systematic: Array  # (J,) typical systematic standard error
+
+
+@dataclass(frozen=True)
 class RandomEffects:
     """The fitted model of N flights of J tails.
 
     ``mean`` has the standard error ``mean_error`` without and ``total_error`` with systematic errors, and the 95 %
-    interval ``lower`` to ``upper`` with them. ``own`` (J,) is the mean of each tail's flights alone and ``own_error``
-    (J,) its standard error (scatter of flights included, systematic errors not). ``level`` (J,) is the empirical Bayes
-    estimate of each tail, ``level_error`` (J,) its standard error without systematic errors, and ``shrinkage`` (J,)
-    the weight of the type's mean in it. ``systematic`` (J,) is the typical systematic standard error of each tail.
+    interval ``lower`` to ``upper`` with them.
     """
 
     mean: float
@@ -60,12 +69,7 @@ class RandomEffects:
     upper: float
     tails: Scatter
     flights: Scatter
-    own: Array
-    own_error: Array
-    level: Array
-    level_error: Array
-    shrinkage: Array
-    systematic: Array
+    by_tail: TailEffects
     freedom: int  # of the scatter of flights: flights less tails
 
 
@@ -295,11 +299,13 @@ def _estimates(data: _Data, found: _Profile, tails: Scatter) -> RandomEffects:
         upper=data.centre + mean + float(half),
         tails=tails,
         flights=found.omega,
-        own=data.centre + own,
-        own_error=np.sqrt(1.0 / information),
-        level=data.centre + mean + kept * (own - mean),
-        level_error=np.asarray(level_error),
-        shrinkage=1.0 - kept,
-        systematic=systematic,
+        by_tail=TailEffects(
+            own=data.centre + own,
+            own_error=np.sqrt(1.0 / information),
+            level=data.centre + mean + kept * (own - mean),
+            level_error=np.asarray(level_error),
+            shrinkage=1.0 - kept,
+            systematic=systematic,
+        ),
         freedom=data.y.size - data.J,
     )

@@ -111,9 +111,9 @@ def _population(population: Population) -> dict[str, Any]:
         "scatter_of_tails": _plain(fit.tails), "scatter_of_flights": _plain(fit.flights),
         "by_tail": [
             {
-                "tail": tail, "own": _number(fit.own[j]), "own_error": _number(fit.own_error[j]),
-                "level": _number(fit.level[j]), "level_error": _number(fit.level_error[j]),
-                "shrinkage": _number(fit.shrinkage[j]), "systematic": _number(fit.systematic[j]),
+                "tail": tail, "own": _number(fit.by_tail.own[j]), "own_error": _number(fit.by_tail.own_error[j]),
+                "level": _number(fit.by_tail.level[j]), "level_error": _number(fit.by_tail.level_error[j]),
+                "shrinkage": _number(fit.by_tail.shrinkage[j]), "systematic": _number(fit.by_tail.systematic[j]),
             }
             for j, tail in enumerate(series.tails)
         ],

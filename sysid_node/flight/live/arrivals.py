@@ -21,6 +21,27 @@ RECENT = 5.0  # s: delays are compared with the smallest of a period this long a
 
 
 @dataclass
+class Delays:
+    """Delays, arrival less stamp (s), of which the smallest is that of a message that did not wait."""
+
+    smallest: float = math.inf  # in this period
+    smallest_before: float = math.inf  # in the period before
+    period_start: float = -math.inf  # s, by the clock
+    largest: float = 0.0  # beyond the smallest, since the last report
+
+    def add(self, now: float, delay: float) -> None:
+        """Compare a delay with the smallest of this period and of the one before; ``now`` (s) is by the clock."""
+        if now - self.period_start > RECENT:
+            self.smallest, self.smallest_before, self.period_start = math.inf, self.smallest, now
+        self.smallest = min(self.smallest, delay)
+        self.largest = max(self.largest, delay - min(self.smallest, self.smallest_before))
+
+    def forget(self) -> None:
+        """Forget the smallest ones: stamps are by another clock now."""
+        self.smallest = self.smallest_before = math.inf
+
+
+@dataclass
 class Arrivals:
     """The arrivals of one topic; ``silent_after`` s without a message count as silence. ``clock`` never jumps."""
 
@@ -31,12 +52,9 @@ class Arrivals:
     stamp: float = math.nan  # s, the newest
     start: tuple[float, float] = (math.nan, math.nan)  # s, ``clock`` and stamp when the stamps began, or were set
     intervals: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT))  # s between stamps
-    smallest_delay: float = math.inf  # s, arrival less stamp, in this period
-    smallest_before: float = math.inf  # s, in the period before
-    period_start: float = -math.inf  # s, by ``clock``
+    delays: Delays = field(default_factory=Delays)
     received: int = 0  # since the last report
     missing: int = 0
-    largest_delay: float = 0.0  # s, beyond the smallest
     events: list[str] = field(default_factory=list)  # that were not reported yet
     count: int = 0  # of all problems so far
 
@@ -55,11 +73,11 @@ class Arrivals:
         if step <= -STEP_BACK or step - expected > STEP_AHEAD:
             self.start = now, stamp
             self._add(f"clock set by {step:+.1f} s")
-            self.smallest_delay = self.smallest_before = math.inf
+            self.delays.forget()
         elif 0.0 < step < self.silent_after:  # a silence is said as such, not as messages that are missing
             self._count_missing(step)
         self.stamp, self.received = stamp, self.received + 1
-        self._compare_delay(now, now - stamp)
+        self.delays.add(now, now - stamp)
         return True
 
     def silent(self) -> bool:
@@ -74,10 +92,10 @@ class Arrivals:
         share = self.missing / max(self.received + self.missing, 1)
         if share > SHARE:
             words.append(f"{100.0 * share:.0f} % lost")
-        if self.largest_delay > LATE:
-            words.append(f"up to {1e3 * self.largest_delay:.0f} ms late")
-        self.count += share > SHARE or self.largest_delay > LATE
-        self.received, self.missing, self.largest_delay = 0, 0, 0.0
+        if self.delays.largest > LATE:
+            words.append(f"up to {1e3 * self.delays.largest:.0f} ms late")
+        self.count += share > SHARE or self.delays.largest > LATE
+        self.received, self.missing, self.delays.largest = 0, 0, 0.0
         return [f"{self.topic} {problem}" for problem in words]
 
     def _expected_step(self, now: float) -> float:
@@ -94,13 +112,6 @@ class Arrivals:
     def _add(self, event: str) -> None:
         self.events.append(event)
         self.count += 1
-
-    def _compare_delay(self, now: float, delay: float) -> None:
-        """Compare a delay (s) with the smallest of this period and of the one before."""
-        if now - self.period_start > RECENT:
-            self.smallest_delay, self.smallest_before, self.period_start = math.inf, self.smallest_delay, now
-        self.smallest_delay = min(self.smallest_delay, delay)
-        self.largest_delay = max(self.largest_delay, delay - min(self.smallest_delay, self.smallest_before))
 
     def _count_missing(self, step: float) -> None:
         """Count the messages that are missing between two stamps.

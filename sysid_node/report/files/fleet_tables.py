@@ -88,12 +88,12 @@ def _tails(summary: FleetSummary) -> Table:
             if found is not None:
                 apart = (found.distance, found.error, found.adjusted_p, str(found.significant).lower())
             numbers = (
-                fit.own[j],
-                fit.own_error[j],
-                fit.level[j],
-                fit.level_error[j],
-                fit.systematic[j],
-                fit.shrinkage[j],
+                fit.by_tail.own[j],
+                fit.by_tail.own_error[j],
+                fit.by_tail.level[j],
+                fit.by_tail.level_error[j],
+                fit.by_tail.systematic[j],
+                fit.by_tail.shrinkage[j],
             )
             prior = summary.priors[aircraft, tail][name]
             who = aircraft, tail, name, prior.flights

@@ -17,7 +17,7 @@ def test_of_one_derivative_is_the_single_model():
     assert joint.mean[0] == pytest.approx(single.mean, abs=2e-5)
     assert np.sqrt(joint.tail_scatter[0, 0]) == pytest.approx(single.tails.value, rel=0.02)
     assert np.sqrt(joint.flight_scatter[0, 0]) == pytest.approx(single.flights.value, rel=0.05)
-    assert joint.level[:, 0] == pytest.approx(single.level, abs=1e-4)
+    assert joint.level[:, 0] == pytest.approx(single.by_tail.level, abs=1e-4)
 
 
 def test_finds_the_correlation_of_tails():

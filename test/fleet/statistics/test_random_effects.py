@@ -26,7 +26,7 @@ def test_is_statsmodels_mixed_model_where_all_known_errors_are_equal():
     assert fit.mean_error == pytest.approx(0.228926, rel=2e-3)
     assert fit.tails.value == pytest.approx(0.606564, rel=3e-3)
     assert fit.flights.value == pytest.approx(0.384736, rel=5e-3)
-    assert fit.level[:3] - fit.mean == pytest.approx([0.2002831, 0.1202795, -0.4401840], abs=2e-3)
+    assert fit.by_tail.level[:3] - fit.mean == pytest.approx([0.2002831, 0.1202795, -0.4401840], abs=2e-3)
 
 
 def test_is_the_analysis_of_variance():

@@ -31,7 +31,7 @@ def test_the_worn_tail_drifts_and_no_other(found):
 
 def test_its_prior_is_its_present_state(found):
     prior = found.priors["cdrw", "t3"]["Cl_da"]
-    steady = found.populations["cdrw", "Cl_da"].fit.level[3]
+    steady = found.populations["cdrw", "Cl_da"].fit.by_tail.level[3]
     assert prior.value == pytest.approx(steady - 0.04, abs=0.015)
     assert prior.error > found.priors["cdrw", "t2"]["Cl_da"].error  # the step is uncertain
 

@@ -79,13 +79,15 @@ def _difference(difference: float, file: float, name: str) -> str:
 def forest(population: Population) -> Figure:
     """Each tail's own mean and its estimate drawn towards the type's mean, with 95 % intervals."""
     fit, tails = population.fit, np.array(population.series.tails)
-    order = np.argsort(fit.level)
+    order = np.argsort(fit.by_tail.level)
     if order.size > _MOST_TAILS:
-        far = np.argsort(-np.abs(fit.level - fit.mean))[:_MOST_TAILS]
+        far = np.argsort(-np.abs(fit.by_tail.level - fit.mean))[:_MOST_TAILS]
         order = order[np.isin(order, far)]
     names = tails[order].tolist()
-    own = _interval(fit.own[order], names, fit.own_error[order], "the tail's flights alone", MUTED, "circle-open")
-    level = _interval(fit.level[order], names, fit.level_error[order], "with the fleet", BLUE, "circle")
+    own = _interval(
+        fit.by_tail.own[order], names, fit.by_tail.own_error[order], "the tail's flights alone", MUTED, "circle-open"
+    )
+    level = _interval(fit.by_tail.level[order], names, fit.by_tail.level_error[order], "with the fleet", BLUE, "circle")
     band = {
         "type": "rect", "yref": "paper", "y0": 0, "y1": 1, "x0": fit.lower, "x1": fit.upper,
         "fillcolor": BLUE_BAND, "line": {"width": 0}, "layer": "below",
