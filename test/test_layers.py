@@ -47,6 +47,9 @@ ROOMS = {
     "cli": ("shared", "live", "models", "flights", "main", "__main__"),
 }  # fmt: skip
 
+#: Modules in one folder, beside its ``__init__``.
+MOST_MODULES = 14
+
 ROS_PACKAGES = {
     "rclpy",
     "ament_index_python",
@@ -108,6 +111,17 @@ def test_rooms_of_a_layer_import_in_one_direction(layer: str) -> None:
             parts = name.split(".")
             if parts[:2] == ["sysid_node", layer] and len(parts) > 2 and parts[2] in order:
                 assert order.index(parts[2]) <= order.index(room), f"{path.relative_to(PACKAGE)} imports {name}"
+
+
+def test_no_room_holds_more_modules_than_one_can_survey() -> None:
+    """But for the effects of the simulator, of which each is a module of its own."""
+    counts: dict[str, int] = {}
+    for path in modules():
+        if path.stem != "__init__":
+            room = str(path.parent.relative_to(PACKAGE))
+            counts[room] = counts.get(room, 0) + 1
+    assert counts.pop("sim/effects") > MOST_MODULES
+    assert {room: count for room, count in counts.items() if count > MOST_MODULES} == {}
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
