@@ -78,7 +78,7 @@ EFFECT_NAMES: Mapping[str, EffectNames] = {
     ),
     "control_effectiveness_loss": _each("1", -1.0, 1.0, _ONSET),
     "steady_wind": _fixed(*_alike("north east", "m/s", -60.0, 60.0), ("down", "m/s", -30.0, 30.0)),
-    "turbulence": _fixed(("intensity", "m/s", 0.0, 15.0)),
+    "turbulence": _fixed(("intensity", "m/s", 0.0, 15.0), ("rotation", "1", 0.0, 2.0)),
     "gust": _fixed(
         *_alike("forward right down", "m/s", -30.0, 30.0),
         ("start", "s", -_INFINITE, _INFINITE),

@@ -83,6 +83,9 @@ class Priors:
     gusty: float = _threshold(
         0.005, "1", "motion of the air (rms), as a share of the airspeed, from which a flight is one in gusts"
     )
+    rotation: float = _threshold(
+        0.5, "1", "1 sigma of the rotation that the aircraft feels in gusts, as a share of that which the vanes show"
+    )
     jammed: float = _threshold(0.95, "1", "least share of its movement that a stuck surface has lost")
     lowest_mode: float = _threshold(
         3.0,

@@ -147,13 +147,14 @@ def nuisances_of(
     sigma |= {n: s for n, s in _biases(aircraft).items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
     sigma |= {f"vane_bias.{angle}": THRESHOLDS.priors.inferred_angle for angle in model.flight.inferred}
     if any(is_gusty(m) for m in models):
-        sigma |= _turning_air(aircraft)
+        sigma["turbulence.rotation"] = THRESHOLDS.priors.rotation
     limit = {name: THRESHOLDS.priors.limit * s for name, s in sigma.items()}
-    limit |= {name: min(limit[name], room) for name, room in _room(model.simulator, believed).items()}
+    ranged = [*believed, *(name for name in sigma if name.startswith("turbulence"))]
+    limit |= {name: min(limit[name], room) for name, room in _room(model.simulator, ranged).items()}
     for clock, interval in zip(CLOCKS, (model.flight.step_interval, 1.0 / model.flight.air_rate), strict=True):
         sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 * interval, interval
     names = model.simulator.names
-    of_aircraft = ("derivative_error", "unsteady_aerodynamics", *CLOCKS, *(f"{name}" for name in believed))
+    of_aircraft = ("derivative_error", "turbulence", *CLOCKS, *(f"{name}" for name in believed))
     shared = np.array([name.startswith(of_aircraft) for name in sigma])
     numbers = (np.array(list(sigma.values())), np.array(list(limit.values())))
     given = {f"derivative_error.{name}": size for name, size in (room or _expected_differences(aircraft)).items()}
@@ -206,16 +207,6 @@ def _room(simulator: Simulator, names: Iterable[str]) -> dict[str, float]:
     values, indices = simulator.neutral(), {name: simulator.names.index(name) for name in names}
     table = {name: simulator.parameters[i][1] for name, i in indices.items()}
     return {n: float(min(p.upper - values[indices[n]], values[indices[n]] - p.lower)) for n, p in table.items()}
-
-
-def _turning_air(aircraft: Aircraft) -> dict[str, float]:
-    """Standard deviations of alpha-rate derivatives in gusts, by name: half of the file's C_q.
-
-    Rising air also rotates, q_g = -dalpha_g/dt (MIL-F-8785C, sect. 3.7.2), which acts like a derivative with respect to
-    the rate of alpha of up to -C_q.
-    """
-    damping = {c: abs(aircraft.derivatives[f"{c}_q"].value) for c in ("CL", "Cm") if f"{c}_q" in aircraft.derivatives}
-    return {f"unsteady_aerodynamics.{c}_alphadot": 0.5 * size for c, size in damping.items() if size}
 
 
 _SIDEWAYS = frozenset({"ay", "p", "r", "beta"})

@@ -25,6 +25,7 @@ from sysid_node.dynamics.rigid_body import velocity_rate
 from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim.effects import air_data_lag, imu_misalignment
+from sysid_node.sim.effects.actuator_lag import first_order
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar, Values
 from sysid_node.sim.model.parameters import Parameters
@@ -36,6 +37,10 @@ READINGS = ("V", "alpha", "beta", "phi", "theta", "psi")
 
 #: Time constant with which the observer corrects the attitude, s; the wind does not disturb it.
 _ATTITUDE_MEMORY = 4.0
+
+
+#: Times that the air's rotation is taken off the flow at a probe ahead of the CG.
+_PASSES = 2
 
 
 class InstrumentReadings(NamedTuple):
@@ -135,29 +140,78 @@ def corrected_motion(chain: Chain, motion: InstrumentReadings) -> Sample:
 
 
 class Flow(NamedTuple):
-    """The flow at the time of the samples, and its rate of change."""
+    """The flow at the time of the samples, its rate of change, and the rotation of the air."""
 
     velocity: Vector  # (N,) relative to the air at the CG, m/s
     alpha_rate: Scalar  # (N,) rad/s at the CG
+    air_rotation: Vector  # (N,) of the air about body axes, rad/s, where the vanes show it
 
 
 export.register_namedtuple_serialization(Flow, serialized_name="sysid.Flow")
 
 
-def flow_of(chain: Chain, motion: InstrumentReadings, memory: Scalar | float) -> Flow:
+def flow_of(chain: Chain, motion: InstrumentReadings, memory: Scalar | float, vanes: Scalar) -> Flow:
     """The flow by the inertial instruments, corrected by the vanes with a time constant ``memory``, s.
 
     Only the vanes show gusts: with a memory of zero they are followed at every sample. In still air their noise would
     pass for motion, and noise in a regressor biases derivatives toward zero, the more so the less the aircraft moves.
+    ``vanes`` (2,) is one where alpha and beta were measured, and zero elsewhere.
     """
     samples = corrected_motion(chain, motion)
     moving, _ = rates_of_change(samples.velocity, samples.attitude, samples.force, samples.rates)
     velocity, rate = _followed(samples.velocity, moving, memory, chain.step)
     _, alpha_rate, _ = flow_rates(velocity, rate, jnp)
-    _, alpha, _ = flow_angles(samples.velocity, jnp)
-    followed, seen = Flow(velocity, alpha_rate), Flow(samples.velocity, slope(alpha, chain.step))
+    still = jnp.zeros_like(alpha_rate)
+    followed = Flow(velocity, alpha_rate, Vector(still, still, still))
+    seen = _in_turning_air(chain, samples, vanes)
     flow: Flow = jax.tree.map(lambda a, b: jnp.where(memory > 0.0, a, b), followed, seen)
     return flow
+
+
+def _in_turning_air(chain: Chain, samples: Sample, vanes: Scalar) -> Flow:
+    """The flow that the vanes show, at the CG of an aircraft in air that turns.
+
+    A probe ahead of the CG also measures the air's rotation, which follows from the flow at the CG: so both are
+    computed twice.
+    """
+    arm, at_probe = _probe(chain), Vector(*velocity_of(samples.flow.T, jnp))
+    velocity, rotation = samples.velocity, _air_rotation(chain, samples, samples.velocity, vanes)
+    for _ in range(_PASSES):
+        velocity = Vector(*velocity_from(at_probe, samples.rates.minus(rotation), arm))
+        rotation = _air_rotation(chain, samples, velocity, vanes)
+    _, alpha, _ = flow_angles(velocity, jnp)
+    return Flow(velocity, slope(alpha, chain.step), rotation)
+
+
+def _air_rotation(chain: Chain, samples: Sample, velocity: Vector, vanes: Scalar) -> Vector:
+    """The rotation (N,) of the air, rad/s, from the rates of the flow angles that no motion of the aircraft explains.
+
+    Gusts that the aircraft flies through turn it by their gradient along the path, d/dx = 1/V d/dt in frozen
+    turbulence, and its span smooths them (MIL-F-8785C (1980), q_g and r_g of the Dryden form).
+    Nothing shows rolling gusts.
+    """
+    moving, _ = rates_of_change(velocity, samples.attitude, samples.force, samples.rates)
+    _, *by_motion = flow_rates(velocity, moving, jnp)
+    speed, *angles = flow_angles(velocity, jnp)
+    unexplained = [slope(angle, chain.step) - rate for angle, rate in zip(angles, by_motion, strict=True)]
+    size = chain.model.span / (jnp.pi * speed.mean())
+    pitch, yaw = (
+        share * _lagged(lag * size, rate, chain.step)
+        for share, lag, rate in zip(vanes, (4.0, 3.0), unexplained, strict=True)
+    )
+    return Vector(jnp.zeros_like(speed), pitch, -yaw)
+
+
+def _lagged(time_constant: Scalar, series: Scalar, step: Scalar) -> Scalar:
+    """A series (N,) through a first-order lag that begins at rest."""
+
+    def advance(last: Scalar, pair: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+        now = first_order(time_constant, last, *pair, step)
+        return now, now
+
+    before = jnp.concatenate([series[:1], series[:-1]])
+    _, lagging = jax.lax.scan(advance, jnp.zeros(()), (before, series))
+    return lagging
 
 
 def _followed(seen: Vector, moving: Vector, memory: Scalar | float, step: Scalar) -> tuple[Vector, Vector]:

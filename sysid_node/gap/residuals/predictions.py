@@ -55,6 +55,7 @@ class PredictionInputs(NamedTuple):
     signals: MeasuredSignals
     motion: InstrumentReadings | None  # None without attitude
     memory: ObserverMemory
+    vanes: Scalar  # (2,) one where alpha and beta were measured, zero elsewhere
     step: Scalar  # s
 
 
@@ -65,7 +66,7 @@ def flow(
     if inputs.motion is None:
         return None
     chain = Chain.of(layout, model, theta, inputs.step, jnp.zeros(()))
-    return flow_of(chain, inputs.motion, inputs.memory.vane)
+    return flow_of(chain, inputs.motion, inputs.memory.vane, inputs.vanes)
 
 
 @partial(jax.jit, static_argnums=0)  # traced once for all programs that contain it
@@ -80,7 +81,7 @@ def force_coefficients(
     """Six coefficients (N,) of forces and moments that parameters (P,) predict in a flow that is known."""
     signals = inputs.signals
     if known_flow is not None:
-        signals = signals._replace(velocity=known_flow.velocity, alpha_rate=known_flow.alpha_rate)
+        signals = signals._replace(**known_flow._asdict())
     return tuple(
         coefficients(model, inputs.signals, predict_accelerations(layout, model, theta, signals, inputs.step, acting))
     )

@@ -33,6 +33,7 @@ class MeasuredSignals(NamedTuple):
     #: (N,) m/s, of the CG relative to the air, at the true times; replaces what follows from ``air`` where it is given.
     velocity: Vector | None = None
     alpha_rate: Scalar | None = None  # (N,) rad/s; replaces the difference quotient of alpha where it is given
+    air_rotation: Vector | None = None  # (N,) rad/s, of the air about body axes; none where it is not known
 
 
 def signals_of(simulator: Simulator, record: FlightRecord) -> MeasuredSignals:

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from sysid_node.dynamics.airflow import flow_angles, velocity_of
 from sysid_node.dynamics.lever_arm import velocity_from
 from sysid_node.dynamics.vector import Vector
+from sysid_node.sim.effects import turbulence
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import Scalar
 from sysid_node.sim.prediction.signals import MeasuredSignals
@@ -26,6 +27,7 @@ class TrueMotion(NamedTuple):
     density: Scalar  # kg/m^3
     climb: Scalar  # m since the start
     alpha_rate: Scalar  # rad/s
+    air_rotation: Vector  # of the air, as far as the aircraft feels it, rad/s
     time: Scalar  # s since the start
 
 
@@ -48,11 +50,21 @@ def true_motion(chain: Chain, signals: MeasuredSignals) -> TrueMotion:
         density=signals.density,
         climb=signals.climb,
         alpha_rate=slope(alpha, step) if signals.alpha_rate is None else signals.alpha_rate,
+        air_rotation=_air_rotation(chain, signals),
         time=jnp.arange(signals.density.shape[0]) * step,
     )
 
 
+def _air_rotation(chain: Chain, signals: MeasuredSignals) -> Vector:
+    """The air's rotation (N,) as far as the aircraft feels it, rad/s; zero where it is not known."""
+    if signals.air_rotation is None:
+        still = jnp.zeros_like(signals.density)
+        return Vector(still, still, still)
+    return Vector(*(turbulence.felt_rotation(chain.effects["turbulence"], part) for part in signals.air_rotation))
+
+
 def flow_at(motion: TrueMotion) -> Air:
-    """The flow at the CG."""
+    """The flow at the CG; its rates are those of the aircraft relative to the rotating air."""
     speed, alpha, beta = flow_angles(motion.velocity, jnp)
-    return Air(motion.velocity, motion.rates, speed, alpha, beta, motion.density)
+    turning = motion.rates.minus(motion.air_rotation)
+    return Air(motion.velocity, turning, speed, alpha, beta, motion.density)

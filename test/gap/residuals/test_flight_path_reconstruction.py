@@ -66,6 +66,28 @@ def test_gusts_are_measured_by_the_vanes(aircraft, plain_model) -> None:
     assert float(gusty.inputs.memory.observer) < float(plain_model.inputs.memory.observer)
 
 
+def test_the_airs_rotation_is_taken_off_the_pitching_moment(aircraft) -> None:
+    """Truth: the simulated gusts turn the aircraft. With their rotation as the vanes show it, only noise is left."""
+    model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, {}, seed=12, turbulence="light"))
+    rotation, moment = model.simulator.names.index("turbulence.rotation"), CHANNELS.index("Cm")
+    fast = model.windows.frequencies > 2.4
+    left = []
+    for share in (0.0, 1.0, 2.0):
+        theta = model.simulator.neutral()
+        theta[rotation] = share
+        power = (np.abs(model.residual(theta)[:, fast, moment]) ** 2).mean(axis=0)
+        left.append(power.sum() / model.noise[fast, moment].sum())
+    assert left[1] < 1.5
+    assert min(left[0], left[2]) > 5.0 * left[1]
+
+
+def test_no_air_turns_without_vanes(aircraft, plain_model) -> None:
+    gusty = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, {}, seed=12, turbulence="light"))
+    unseen = replace(gusty, inputs=gusty.inputs._replace(vanes=jnp.zeros(2)))
+    for model in (plain_model, unseen):
+        assert not np.any(model.flow(model.simulator.neutral()).air_rotation)
+
+
 def test_moment_with_the_rate_of_alpha_is_found_despite_the_vane_noise(aircraft) -> None:
     """Truth: the simulator. By the vane's differences it is -5.0: what is differentiated is mostly noise."""
     model = residual_model_of(

@@ -1,5 +1,6 @@
 """The time of a failure is found from afar; truth: the onset that was flown, while the surface moves or rests."""
 
+import numpy as np
 import pytest
 from gap_flights import fly
 
@@ -15,10 +16,12 @@ from sysid_node.gap.validation.standard_errors import standard_errors
 from sysid_node.sim import Simulator
 
 
-def fitted(aircraft: Aircraft, onset: float, start: float, turbulence: str = "none") -> tuple[CandidateFit, Candidate]:
+def fitted(
+    aircraft: Aircraft, onset: float, start: float, turbulence: str = "none", seed: int = 15
+) -> tuple[CandidateFit, Candidate]:
     """An elevator that loses half its effect at a time (s), its onset and loss fitted from a start."""
     effects = {"control_effectiveness_loss": {"elevator": 0.5, "onset": onset}}
-    model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, effects, seed=15, turbulence=turbulence))
+    model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, effects, seed=seed, turbulence=turbulence))
     nuisances = nuisances_of(aircraft, model)
     label = "control_effectiveness_loss of elevator"
     (candidate,) = (c for c in candidates_of(model.simulator, [model]) if c.label == label)
@@ -36,12 +39,21 @@ def test_an_onset_is_found_though_the_fit_starts_seconds_away(aircraft) -> None:
     assert abs(found.values[loss] - 0.5) < 3.0 * errors[loss] < 0.03
 
 
-def test_of_an_onset_while_the_surface_rests_the_gusts_tell_little(aircraft) -> None:
-    """No elevator is flown from 11 to 17 s; what it lost is known as well as it is from after that."""
-    far, candidate = fitted(aircraft, 13.0, 16.0, "light")
-    loss, onset = (far.indices.index(i) for i in candidate.indices)
-    found = liml_estimate(converged(search_onset(far, candidate)))
-    errors = standard_errors(found)
-    assert 0.8 < errors[onset] < 5.0
-    assert abs(found.values[onset] - 13.0) < 2.0 * errors[onset]
-    assert abs(found.values[loss] - 0.5) < 2.0 * errors[loss] < 0.2
+def test_an_onset_in_gusts_is_as_far_off_as_its_standard_error_says(aircraft) -> None:
+    """The squares of eight errors have a chi-square distribution, 1 % of it beyond 20.1.
+
+    Only the autopilot moves the elevator from 11 to 17 s. Over 17 flights the errors were 0.8 s (rms), 1.1 times what
+    was stated.
+    """
+    errors, squares = [], 0.0
+    for seed in (15, *range(21, 28)):
+        far, candidate = fitted(aircraft, 13.0, 16.0, "light", seed)
+        loss, onset = (far.indices.index(i) for i in candidate.indices)
+        found = liml_estimate(converged(search_onset(far, candidate)))
+        stated = standard_errors(found)
+        errors.append(found.values[onset] - 13.0)
+        squares += (errors[-1] / stated[onset]) ** 2
+        assert 0.4 < stated[onset] < 2.0
+        assert abs(found.values[loss] - 0.5) < 2.5 * stated[loss] < 0.1
+    assert squares < 20.1
+    assert np.sqrt(np.mean(np.square(errors))) < 1.5
