@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.nuisances import Nuisances
-from sysid_node.gap.estimation.spectral_weights import real_rows, residual_power, weights
+from sysid_node.gap.estimation.spectral_weights import noise_pull, real_rows, residual_power, weights
 from sysid_node.gap.residuals.parameter_priors import bounds, prior
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import Complex
@@ -160,6 +160,24 @@ class CandidateFit:
         return -0.5 * squares - self.log_widening
 
     @property
+    def noise_pull(self) -> Array:
+        """Pull (unknowns,) on all unknowns that corrects for the noise of the regressors, see ``noise_pull``."""
+        return self.noise_pull_on(self.indices)
+
+    def noise_pull_on(self, indices: Sequence[int]) -> Array:
+        """The same with other entries of the parameter vector in place of those that the candidates fit."""
+        pull = np.zeros(len(indices) + self.stacked[0].size)
+        for number, flight in enumerate(self.flights):
+            entries, count = [*indices, *flight.nuisances.indices], flight.model.windows.count
+            own = noise_pull(flight.model, flight.power, flight.point, entries, count)
+            pull[self.places_of(number, len(indices))] += own
+        return pull
+
+    def places_of(self, number: int, values: int) -> NDArray[np.intp]:
+        """Places among all unknowns of so many values and of one flight's nuisance parameters."""
+        return np.concatenate([np.arange(values), values + self.flights[number].nuisances.places(number)])
+
+    @property
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of unknowns: of the candidates, shared by the flights, and of each flight alone."""
         shared = int(self.nuisances.shared.sum())
@@ -180,7 +198,7 @@ def unfitted(models: Sequence[ResidualModel], nuisances: Nuisances) -> Candidate
     flights = []
     for model in models:
         neutral = model.simulator.neutral()
-        flights.append(FlightFit(model, nuisances, neutral, residual_power(model, model.residual(neutral))))
+        flights.append(FlightFit(model, nuisances, neutral, residual_power(model, model.residual(neutral), neutral)))
     return CandidateFit(tuple(flights), ())
 
 

@@ -36,9 +36,10 @@ def converged(fit: CandidateFit, rounds: int = _ROUNDS) -> CandidateFit:
         problem = VariableProjection(fit, near)
         fit = _one_round(problem)
         residuals = [flight.residual for flight in fit.flights]
-        fit = fit.with_powers([residual_power(m, r) for m, r in zip(fit.models, residuals, strict=True)])
-        raw = ((np.abs(residual) ** 2).mean(axis=0) for residual in residuals)
-        deviance = sum(spectral_deviance(model, power) for model, power in zip(fit.models, raw, strict=True))
+        pairs = list(zip(fit.flights, residuals, strict=True))
+        fit = fit.with_powers([residual_power(flight.model, left, flight.point) for flight, left in pairs])
+        raw = ((flight, (np.abs(left) ** 2).mean(axis=0)) for flight, left in pairs)
+        deviance = sum(spectral_deviance(flight.model, power, flight.point) for flight, power in raw)
         deviance -= 2.0 * fit.prior_score
         if not deviance >= least:
             best, least = fit, deviance

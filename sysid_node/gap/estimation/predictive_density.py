@@ -25,6 +25,9 @@ from sysid_node.gap.estimation.candidate_fit import CandidateFit, FlightFit, lin
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, HeldOutFlight, Nuisances
 from sysid_node.gap.estimation.spectral_weights import (
     amplitudes,
+    excess_squares,
+    line_shares,
+    noise_pull,
     real_rows,
     residual_power,
     spectral_deviance,
@@ -32,7 +35,7 @@ from sysid_node.gap.estimation.spectral_weights import (
 )
 from sysid_node.gap.residuals.excited_axes import commanded_by_window, effective_number
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
-from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex
+from sysid_node.gap.residuals.windowed_spectra import Complex
 from sysid_node.gap.thresholds import THRESHOLDS
 
 #: Rounds in which the noise levels of a flight and the step of the unknowns are computed by turns.
@@ -101,8 +104,8 @@ def whole_flight_evidence(fit: CandidateFit) -> Evidence:
     among = np.ix_(fit.uncertain, fit.uncertain)
     (_, after), (_, before) = (np.linalg.slogdet(each[among]) for each in (fit.information, fit.prior_information))
     residuals = [flight.residual for flight in fit.flights]
-    pairs = zip(fit.models, residuals, strict=True)
-    deviance = sum(spectral_deviance(model, (np.abs(residual) ** 2).mean(axis=0)) for model, residual in pairs)
+    powers = ((f, (np.abs(residual) ** 2).mean(axis=0)) for f, residual in zip(fit.flights, residuals, strict=True))
+    deviance = sum(spectral_deviance(f.model, power, f.point) for f, power in powers)
     flights = tuple(
         FlightEvidence(f.model, residual, (exported_parameters(fit, f.point),) * len(window_groups(f.model)))
         for f, residual in zip(fit.flights, residuals, strict=True)
@@ -137,14 +140,25 @@ def cross_validated_evidence(fit: CandidateFit) -> Evidence:
             others = np.setdiff1d(np.arange(model.windows.count), aside)
             J, r = slopes[aside].reshape(-1, slopes.shape[2]), flight.rows[aside].ravel()
             information = elsewhere[number] + gram[others].sum(axis=0)
-            step = -solve(information, J.T @ r)
-            power = residual_power(model, residual[others]) if others.size > 2 else flight.power
-            part = _Group(model, flight.power, flight.rows[group], slopes[group])
+            pull = _noise_pull(fit, number, flight.power, flight.point, aside.size)
+            step = -solve(information, J.T @ r + pull)
+            power = residual_power(model, residual[others], flight.point) if others.size > 2 else flight.power
+            there = stepped(fit, step).flights[number].point
+            pull = _noise_pull(fit, number, power, there, group.size)
+            part = _Group(model, flight.power, flight.rows[group], slopes[group], there, pull)
             score, predicted[group] = _predictive(part, power, step, information)
             scores.append(score)
-            points.append(exported_parameters(fit, stepped(fit, step).flights[number].point))
+            points.append(exported_parameters(fit, there))
         flights.append(FlightEvidence(model, predicted, tuple(points)))
     return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(flights))
+
+
+def _noise_pull(fit: CandidateFit, number: int, power: Array, point: Array, windows: int) -> Array:
+    """Pull (unknowns,) of the regressors' noise in so many windows of one flight; zero on what is not uncertain."""
+    pull, flight = np.zeros(fit.uncertain.size), fit.flights[number]
+    entries = [*fit.indices, *flight.nuisances.indices]
+    pull[fit.places_of(number, len(fit.indices))] = noise_pull(flight.model, power, point, entries, windows)
+    return np.asarray(pull * fit.uncertain)
 
 
 def competing_evidence(fit: CandidateFit, held_out: Sequence[HeldOutFlight]) -> Evidence:
@@ -198,21 +212,25 @@ def held_out_evidence(fit: CandidateFit, held_out: Sequence[HeldOutFlight]) -> E
         information = np.zeros((len(order), len(order)))
         information[:common, :common] = np.linalg.inv(covariance)
         information[common:, common:] = np.diag(kept.sigma[~kept.shared] ** -2.0)
-        level, groups = noise_levels(rows, slopes, information), window_groups(model)
+        beyond = excess_squares(model, power, point, model.windows.count)
+        level, groups = noise_levels(rows, slopes, information, beyond), window_groups(model)
         for group in groups:
-            part = _Group(model, power, rows[group], slopes[group])
+            pull = noise_pull(model, power * level, point, order, group.size)
+            pull[:common] *= fit.uncertain[:common]
+            part = _Group(model, power, rows[group], slopes[group], point, pull)
             scores.append(_predictive(part, power * level, np.zeros(len(order)), information)[0])
         exported = exported_parameters(fit, point)
         flights.append(FlightEvidence(model, model.residual(point), (exported,) * len(groups)))
     return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(flights))
 
 
-def noise_levels(rows: Array, slopes: Array, information: Array) -> Array:
+def noise_levels(rows: Array, slopes: Array, information: Array, beyond: Array) -> Array:
     """Power (12,) by channel of the noise of a flight that was not fitted, in multiples of that which its rows assume.
 
     ``rows`` (W, R) are its weighted residual, ``slopes`` (W, R, unknowns) those of all unknowns, of which
     ``information`` is known before. The levels are those at which the flight is most probable, the unknowns moving
     along (the scale of a normal linear model, profiled out: Seber & Lee (2003), Linear Regression Analysis, sect. 3.5).
+    ``beyond`` (12,) is the part of the squares by noise beyond that at the file's parameters, which does not count.
     None is below one: how small noise can be is said by the fit.
     """
     J, r = slopes.reshape(-1, slopes.shape[2]), rows.ravel()
@@ -222,7 +240,7 @@ def noise_levels(rows: Array, slopes: Array, information: Array) -> Array:
     for _ in range(_LEVEL_ROUNDS):
         weight = 1.0 / level[channel]
         step = solve(information + J.T @ (J * weight[:, None]), J.T @ (r * weight))
-        squares = np.bincount(channel, (r - J @ step) ** 2, len(CHANNELS))
+        squares = np.bincount(channel, (r - J @ step) ** 2, len(CHANNELS)) - beyond
         level = np.maximum(2.0 * squares / np.maximum(count, 1.0), 1.0)
     return level
 
@@ -250,7 +268,7 @@ def transferred_parameters(fit: CandidateFit, model: ResidualModel) -> Array:
 def fit_on_other_flight(fit: CandidateFit, flight: HeldOutFlight) -> CandidateFit:
     """The fit as it stands on a flight that it has not seen, linearised there; nothing is fitted anew."""
     model, point = flight.model, transferred_parameters(fit, flight.model)
-    power = residual_power(model, model.residual(point))
+    power = residual_power(model, model.residual(point), point)
     flight_fit = FlightFit(model, _kept_nuisances(fit, flight), point, power)
     return linearised(replace(fit, flights=(flight_fit,)))
 
@@ -280,12 +298,17 @@ def _mean_power(fit: CandidateFit, model: ResidualModel) -> Array:
 
 @dataclass(frozen=True)
 class _Group:
-    """A group of w windows: rows (w, R) and slopes (w, R, unknowns), both weighted by ``power`` (L, 12)."""
+    """A group of w windows: rows (w, R) and slopes (w, R, unknowns), both weighted by ``power`` (L, 12).
+
+    ``point`` (P,) are the parameters with which it is predicted, ``pull`` (unknowns,) is that of the noise there.
+    """
 
     model: ResidualModel
     power: Array
     rows: Array
     slopes: Array
+    point: Array
+    pull: Array
 
 
 def _predictive(group: _Group, power: Array, step: Array, information: Array) -> tuple[float, Complex]:
@@ -299,13 +322,12 @@ def _predictive(group: _Group, power: Array, step: Array, information: Array) ->
     scale = np.sqrt(group.power / power)
     scaled = (parts * scale).ravel()
     J = (group.slopes.reshape(*parts.shape, unknowns) * scale[..., None]).reshape(-1, unknowns)
-    gained, right = information + J.T @ J, J.T @ scaled
+    gained, right = information + J.T @ J, J.T @ scaled + group.pull
     _, before = np.linalg.slogdet(information)
     _, after = np.linalg.slogdet(gained)
-    lines = np.ones(group.power.shape[0])
-    lines[0] = 0.5
-    spread = INDEPENDENT_SHARE * windows * float(np.sum(lines[:, None] * np.log(power) * group.model.axes))
-    score = -spread - 0.5 * float(scaled @ scaled) + 0.5 * float(right @ solve(gained, right)) - 0.5 * (after - before)
+    spread = windows * float(np.sum(line_shares(group.model) * np.log(power) * group.model.axes))
+    squares = float(scaled @ scaled) - float(excess_squares(group.model, power, group.point, windows).sum())
+    score = -0.5 * (spread + squares) + 0.5 * float(right @ solve(gained, right)) - 0.5 * (after - before)
     return score, amplitudes(change, weights(group.model.windows, group.power))
 
 

@@ -7,6 +7,8 @@ sensors.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sysid_node.flight.record import Array
@@ -41,21 +43,54 @@ def amplitudes(rows: Array, weight: Array) -> Complex:
     return np.asarray(raw[:, 0] + 1j * raw[:, 1])
 
 
-def residual_power(model: ResidualModel, residual: Complex) -> Array:
+def residual_power(model: ResidualModel, residual: Complex, theta: Array) -> Array:
     """Power (L, 12) of a residual (W, L, 12), averaged within each band, and at least the sensors' noise.
 
-    Channels that were not measured have a power of one.
+    What the noise has more or less at the parameters (P,) than at the file's is taken off. Channels that were not
+    measured have a power of one.
     """
-    power = model.windows.smoothed((np.abs(residual) ** 2).mean(axis=0))
-    return np.where(model.axes, np.maximum(power, model.noise), 1.0)
+    return _with_noise_of_file(model, (np.abs(residual) ** 2).mean(axis=0), theta)
 
 
-def spectral_deviance(model: ResidualModel, power: Array) -> float:
+def spectral_deviance(model: ResidualModel, power: Array, theta: Array) -> float:
     """Minus twice the log likelihood, up to a constant, of a residual whose mean power by line is ``power`` (L, 12).
 
-    The noise spectrum is profiled out: it is the smoothed power itself (the Whittle likelihood at its maximum).
+    The noise spectrum is profiled out: it is the smoothed power itself (the Whittle likelihood at its maximum). What
+    the noise has more or less at the parameters (P,) than at the file's is taken off.
     """
-    floor = np.where(model.axes, np.maximum(model.windows.smoothed(power), model.noise), 1.0)
-    lines = np.ones((power.shape[0], 1))
-    lines[0] = 0.5
-    return 2.0 * INDEPENDENT_SHARE * model.windows.count * float(np.sum(lines * (np.log(floor) + power / floor)))
+    floor = _with_noise_of_file(model, power, theta)
+    left = power - model.excess_noise(theta)
+    return model.windows.count * float(np.sum(line_shares(model) * (np.log(floor) + left / floor)))
+
+
+def excess_squares(model: ResidualModel, power: Array, theta: Array, windows: int) -> Array:
+    """What noise at parameters (P,) beyond that at the file's adds to the squares of weighted rows, by channel (12,).
+
+    ``power`` (L, 12) is that of which the weights are, ``windows`` the number of windows.
+    """
+    return np.asarray(windows * np.sum(line_shares(model) * model.excess_noise(theta) / power * model.axes, axis=0))
+
+
+def noise_pull(model: ResidualModel, power: Array, theta: Array, indices: Sequence[int], windows: int) -> Array:
+    """Half the slope (K,) of the sum of ``excess_squares`` with respect to these entries of the parameters (P,).
+
+    It is the gradient by which least squares of weighted rows is corrected for the noise of the regressors.
+    """
+    pull = np.zeros(len(theta))
+    if model.gain is not None:
+        weight = line_shares(model) / power * model.axes
+        pull[model.gain.indices] = 0.5 * windows * np.einsum("lc,lcj->j", weight, model.gain.slope(theta))
+    return np.asarray(pull[list(indices)])
+
+
+def line_shares(model: ResidualModel) -> Array:
+    """Independent real parts (L, 1) of each line, in halves of its amplitude's two: zero frequency has one."""
+    lines = np.full((model.noise.shape[0], 1), 2.0 * INDEPENDENT_SHARE)
+    lines[0] *= 0.5
+    return lines
+
+
+def _with_noise_of_file(model: ResidualModel, power: Array, theta: Array) -> Array:
+    """Power (L, 12) averaged within each band as it would be with the noise at the file's parameters."""
+    smoothed = model.windows.smoothed(power) - model.excess_noise(theta)
+    return np.where(model.axes, np.maximum(smoothed, model.noise), 1.0)

@@ -58,11 +58,21 @@ class VariableProjection:
         self.matrix = np.vstack([*(block * self.spread for block in blocks), np.eye(self.now.size)])
         self.gram = self.matrix.T @ self.matrix
         self.indices = list(fit.indices)
-        self.centre, self.sigma = prior(fit.simulator, fit.indices)
+        self._set_priors()
         self._kept = (b"", np.empty((0, 0)))
         self.replaces_nuisances = False  # whether a candidate that was added is or replaces some of them
         self._set_free(np.ones(self.now.size, bool), np.zeros(self.now.size))
         self._bind(fit.values)
+
+    def _set_priors(self) -> None:
+        """Sets the priors of the values and of the nuisance parameters, moved by the pull of the regressors' noise.
+
+        A linear term in the logarithm of a Gaussian density moves its centre.
+        """
+        self.file_centre, self.sigma = prior(self.fit.simulator, self.indices)
+        pull = self.fit.noise_pull_on(self.indices)
+        self.centre = self.file_centre + self.sigma**2 * pull[: len(self.indices)]
+        self.nuisance_centre = self.spread**2 * pull[len(self.indices) :]
 
     def _set_free(self, free: NDArray[np.bool_], shift: Array) -> None:
         """Sets which nuisance parameters may move, and how far the others stand from where the residual is taken."""
@@ -106,7 +116,7 @@ class VariableProjection:
         right = np.append(self.matrix.T @ rows, columns.T @ rows - (values - self.centre) / self.sigma**2)
         if not (np.isfinite(gram).all() and np.isfinite(right).all()) or self._active_set_holds(gram, right):
             return values
-        before, deviance = (self.free, self.shift), self.deviance(self.residual(values))
+        before, deviance = (self.free, self.shift), self.deviance(values)
         limit, now = self.limit / self.spread, self.now / self.spread
         lower, upper = np.append(-limit - now, low - values), np.append(limit - now, high - values)
         step = bounded_least_squares(gram, right, lower, upper)
@@ -114,7 +124,7 @@ class VariableProjection:
         beyond = np.abs(moved) > limit * (1.0 - _AT_LIMIT)
         self._set_free(~beyond, np.where(beyond, np.sign(moved) * self.limit - self.now, 0.0))
         stepped_values = values + step[now.size :]
-        if self.deviance(self.residual(stepped_values)) < deviance:
+        if self.deviance(stepped_values) < deviance:
             return stepped_values
         self._set_free(*before)
         return values
@@ -137,7 +147,7 @@ class VariableProjection:
         self._own_slopes = self._own_slopes or self._slopes_by_value(self.fit.values)
         other._held, other._known, other._value_slopes = False, self._own_slopes, []
         other.indices = [*self.fit.indices, *candidate.indices]
-        other.centre, other.sigma = prior(simulator, other.indices)
+        other._set_priors()
         kept = nuisances.without(frozenset({candidate.effect}), simulator.names).indices
         fitted = np.isin(
             nuisances.indices, candidate.indices
@@ -157,7 +167,7 @@ class VariableProjection:
         rows = []
         for flight in self.fit.flights:
             rows.append(real_rows(flight.model.residual(self._point(flight, values)), flight.weights).ravel())
-        return np.concatenate([*rows, -self.now / self.spread]) - self.shifted_rows
+        return np.concatenate([*rows, (self.nuisance_centre - self.now) / self.spread]) - self.shifted_rows
 
     def residual(self, values: Array) -> Array:
         """Rows (R,) whose sum of squares is minimised over the values (K,); the values' own priors are last."""
@@ -198,27 +208,44 @@ class VariableProjection:
         point[self.indices] = values
         return point
 
-    def deviance(self, rows: Array) -> float:
-        """Minus twice the log posterior density of a ``residual`` (R,), up to a constant, the spectrum profiled out.
+    def deviance(self, values: Array) -> float:
+        """Minus twice the log posterior density at values (K,), up to a constant, the spectrum profiled out.
 
         With the weights held instead, an effect would be worth little just where what it explains is most of the
-        residual. Infinite where the prediction diverged.
+        residual. Nuisance parameters are within their limits, wherever they stand at other values. Infinite where the
+        prediction diverged.
         """
-        if not np.abs(rows).max(initial=0.0) < _DIVERGENT:
+        rows, beyond = self._rows(values), (values - self.file_centre) / self.sigma
+        if not np.abs(np.concatenate([rows, beyond])).max(initial=0.0) < _DIVERGENT:
             return np.inf
-        shapes = [(flight.model.windows.count, flight.weights.size) for flight in self.fit.flights]
-        data = sum(count * size for count, size in shapes)
-        total, first = float(np.sum(rows[data:] ** 2)) + 2.0 * self.fit.log_widening, 0
-        for flight, shape in zip(self.fit.flights, shapes, strict=True):
+        best = self._best(rows)
+        moved = self.now + self.shift + self.spread * best
+        if (self.free & (np.abs(moved) > self.limit * (1.0 + _AT_LIMIT))).any():
+            return self._within_limits(values).deviance(values)
+        rows = rows - self.matrix @ best
+        squares = np.sum((moved / self.spread) ** 2) + np.sum(beyond**2)
+        total, first = float(squares) + 2.0 * self.fit.log_widening, 0
+        for flight, point in zip(self.fit.flights, self._placed(values, moved), strict=True):
+            shape = (flight.model.windows.count, flight.weights.size)
             part = rows[first : first + shape[0] * shape[1]].reshape(shape)
             first += part.size
             power = np.mean(np.abs(amplitudes(part, flight.weights)) ** 2, axis=0)
-            total += spectral_deviance(flight.model, power)
+            total += spectral_deviance(flight.model, power, point)
         return total
+
+    def _within_limits(self, values: Array) -> VariableProjection:
+        """The same problem with those nuisance parameters at their limits that would go beyond at these values."""
+        other = copy(self)
+        other._bind(values)
+        return other
 
     def points(self, values: Array) -> tuple[Array, ...]:
         """All parameters (P,) by flight, with the nuisance parameters at their best for these values (K,)."""
-        moved = np.clip(self.now + self._nuisance_step(values), -self.limit, self.limit)
+        return self._placed(values, self.now + self._nuisance_step(values))
+
+    def _placed(self, values: Array, nuisances: Array) -> tuple[Array, ...]:
+        """All parameters (P,) by flight, with nuisance parameters that deviate from the file as far as they may."""
+        moved = np.clip(nuisances, -self.limit, self.limit)
         points = []
         for number, flight in enumerate(self.fit.flights):
             point = self._point(flight, values)

@@ -115,7 +115,8 @@ def reweighted_powers(fit: CandidateFit, by: Instruments) -> tuple[Array, ...]:
     step = limited_step(equations, fit)
     for flight, moments in zip(fit.flights, equations.flights, strict=True):
         remainder = (moments.rows - moments.slopes @ step).reshape(len(moments.rows), -1)
-        power = residual_power(flight.model, amplitudes(remainder, weights_without_mean(flight.model, flight.power)))
+        left = amplitudes(remainder, weights_without_mean(flight.model, flight.power))
+        power = residual_power(flight.model, left, flight.point)
         power[0] = flight.power[0]
         powers.append(power)
     return tuple(powers)

@@ -24,10 +24,11 @@ from sysid_node.gap.residuals.air_motion import (
     observer_memory,
 )
 from sysid_node.gap.residuals.flight_path_reconstruction import READINGS, motion_of
+from sysid_node.gap.residuals.noise_gain import NoiseGain, gain_from, noisy_parameters
 from sysid_node.gap.residuals.predictions import CHANNELS, ObserverMemory, PredictionInputs
 from sysid_node.gap.residuals.residual_model import Measurement, ResidualModel, joined
 from sysid_node.gap.residuals.sensor_noise import with_added_noise
-from sysid_node.gap.residuals.windowed_spectra import Windows
+from sysid_node.gap.residuals.windowed_spectra import Complex, Windows
 from sysid_node.sim import Simulator
 from sysid_node.sim.model.layout import Scalar
 from sysid_node.sim.prediction.accelerations import Accelerations
@@ -46,6 +47,9 @@ _LEAST_NOISE = 1e-18
 #: Lengths (samples) to which flights are padded; longer flights to multiples of ``_BLOCK``. Each length needs another
 #: set of programs, which takes more than a minute to compile; a prediction of thousands of samples takes milliseconds.
 _LENGTHS, _BLOCK = (1500, 3000), 6000
+
+#: Channels of the flow angles.
+_VANES = [CHANNELS.index("alpha"), CHANNELS.index("beta")]
 
 #: Columns of the linear and angular accelerations that the inertial instruments measured.
 _ACCELERATIONS = (("ax", "ay", "az"), ("p_rate", "q_rate", "r_rate"))
@@ -77,7 +81,8 @@ def residual_model_of(
         return calm
     followed = ObserverMemory(memory, 0.0 if is_gusty(calm) else LONGEST_MEMORY)
     shorter = noiseless_model(simulator, flight, record, windows, axes, followed)
-    return _with_measured_noise(replace(shorter, gusts=calm.gusts, instruments=instruments), seed)
+    known = _with_measured_noise(replace(shorter, gusts=calm.gusts, instruments=instruments), seed)
+    return replace(known, gain=_noise_gain(known, seed)) if followed.vane == 0.0 else known
 
 
 def residual_model_like(model: ResidualModel, record: FlightRecord) -> ResidualModel:
@@ -95,7 +100,7 @@ def noiseless_model(
     memory: ObserverMemory,
 ) -> ResidualModel:
     """The residual model of a record whose sensors' noise is not known: its power is one."""
-    inputs, series = _inputs(simulator, record, memory)
+    inputs, series = _inputs(simulator, record, memory, axes[_VANES])
     measurement = Measurement(record, windows, series, windows.transform(series), axes)
     return ResidualModel(simulator, flight, measurement, inputs, np.ones((1, len(CHANNELS))))
 
@@ -126,8 +131,31 @@ def _noise_power(model: ResidualModel, random: np.random.Generator) -> Array:
     return np.maximum(model.windows.smoothed(power), _LEAST_NOISE)
 
 
-def _inputs(simulator: Simulator, record: FlightRecord, memory: ObserverMemory) -> tuple[PredictionInputs, Array]:
-    """What predictions take from a record, padded, and the measured channels (N, 12)."""
+def _noise_gain(model: ResidualModel, seed: int) -> NoiseGain:
+    """How the power of the noise depends on the parameters, from a few realisations of it added to the flight."""
+    simulator, neutral = model.simulator, model.simulator.neutral()
+    indices, random = noisy_parameters(simulator.names), np.random.default_rng(seed)
+    clean = _residual_and_slopes(model, indices)
+    parts = []
+    for _ in range(_REALISATIONS):
+        record = resampled(with_added_noise(simulator.aircraft, model.flight, random), simulator.rate)
+        again = noiseless_model(simulator, model.flight, record, model.windows, model.axes, model.inputs.memory)
+        parts.append(_residual_and_slopes(again, indices) - clean)
+    power = (np.abs(clean[..., 0]) ** 2).mean(axis=0)
+    return gain_from(model.windows, np.concatenate(parts), indices, neutral, power)
+
+
+def _residual_and_slopes(model: ResidualModel, indices: NDArray[np.intp]) -> Complex:
+    """The residual, and its slopes with respect to J parameters (W, L, 12, J + 1), at the file's parameters."""
+    neutral = model.simulator.neutral()
+    slopes = model.slopes(neutral, indices.tolist())
+    return np.concatenate([model.residual(neutral)[..., None], -slopes], axis=3)
+
+
+def _inputs(
+    simulator: Simulator, record: FlightRecord, memory: ObserverMemory, vanes: NDArray[np.bool_]
+) -> tuple[PredictionInputs, Array]:
+    """What predictions take from a record, padded, and the measured channels (N, 12); ``vanes`` (2,) were measured."""
     signals, missing = signals_of(simulator, record), padded_length(len(record)) - len(record)
     motion = motion_of(record)
     signals, motion = (jax.tree.map(lambda x: _padded(x, missing), parts) for parts in (signals, motion))
@@ -135,7 +163,8 @@ def _inputs(simulator: Simulator, record: FlightRecord, memory: ObserverMemory) 
     forces = joined(_measured_coefficients(simulator.model, signals, Accelerations(*accelerations)), len(record))
     empty = jnp.zeros((len(record) + missing, len(READINGS)))
     read = empty if motion is None else jnp.hstack([motion.air, motion.attitude])
-    inputs = PredictionInputs(signals, motion, jax.tree.map(jnp.asarray, memory), jnp.asarray(simulator.step))
+    memories, measured = jax.tree.map(jnp.asarray, memory), jnp.asarray(vanes, float)
+    inputs = PredictionInputs(signals, motion, memories, measured, jnp.asarray(simulator.step))
     return inputs, np.concatenate([forces, np.asarray(read)[: len(record)]], axis=1)
 
 

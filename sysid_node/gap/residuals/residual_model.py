@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.residuals.flight_path_reconstruction import Flow
+from sysid_node.gap.residuals.noise_gain import NoiseGain
 from sysid_node.gap.residuals.prediction_cache import cache_of
 from sysid_node.gap.residuals.predictions import (
     AIR_AND_ATTITUDE,
@@ -72,6 +73,7 @@ class ResidualModel:
     simulator_error: Array = field(default_factory=lambda: np.zeros(len(CHANNELS)))  # (12,) see ``SimulatorError``
     reading_errors: Mapping[str, float] = field(default_factory=dict)  # the same of short flights' readings
     instruments: Array | None = None  # (P,) parameters at which the air seems to move least; none: the file's
+    gain: NoiseGain | None = None  # how the noise's power depends on the parameters; none: it does not
 
     @property
     def record(self) -> FlightRecord:
@@ -102,6 +104,10 @@ class ResidualModel:
     def commands(self) -> Array:
         """Commands (N, controls + 1) as recorded: deflections in rad, thrust in N."""
         return np.asarray(self.inputs.signals.commands)[: len(self.record)]
+
+    def excess_noise(self, theta: Array) -> Array:
+        """Power (L, 12) of the sensors' noise in the residual at parameters (P,) beyond that at the file's."""
+        return np.zeros_like(self.noise) if self.gain is None else self.gain.excess(theta)
 
     def predicted_series(self, theta: Array) -> Array:
         """Channels (N, 12) that parameters (P,) predict."""
@@ -144,7 +150,7 @@ class ResidualModel:
     def series_by_derivative(self, theta: Array) -> Array:
         """Derivatives (N, 6, D) of the predicted coefficients by each derivative of the aircraft file."""
         s = self.simulator
-        slopes = slopes_by_derivative(s.layout, s.model, theta, self._acting(theta), self.inputs, self._flow(theta))
+        slopes = slopes_by_derivative(s.layout, s.model, theta, self._acting(theta), self.inputs, self.flow(theta))
         return joined(slopes, len(self.record))
 
     def programs(self) -> Iterator[Callable[[], object]]:
@@ -180,7 +186,7 @@ class ResidualModel:
         """Of parameters (P,) those that flow, air data and attitude depend on."""
         return theta[kinematic_parameters(self.simulator.layout)].tobytes()
 
-    def _flow(self, theta: Array) -> Flow | None:
+    def flow(self, theta: Array) -> Flow | None:
         """The flow at parameters (P,), computed anew where a kinematic one differs."""
         cache, key = cache_of(self), self._kinematic_key(theta)
         known = cache.flows.get(key)
@@ -188,7 +194,7 @@ class ResidualModel:
 
     def _series(self, prediction: Prediction, theta: Array) -> Array:
         """A prediction's channels (N, 6) at parameters (P,)."""
-        return joined(self._evaluate(prediction, theta, self._flow(theta)), len(self.record))
+        return joined(self._evaluate(prediction, theta, self.flow(theta)), len(self.record))
 
     def _evaluate(self, function: Callable[..., _Result], theta: Array, *known_flow: Flow | None) -> _Result:
         s = self.simulator
@@ -211,7 +217,7 @@ class ResidualModel:
         directions = np.zeros((_WIDTHS[prediction], len(free)))
         directions[np.arange(len(indices)), [free.index(i) for i in indices]] = 1.0
         values, slopes = directional_slopes(
-            prediction, s.layout, s.model, theta, acting, directions, self.inputs, self._flow(theta)
+            prediction, s.layout, s.model, theta, acting, directions, self.inputs, self.flow(theta)
         )
         self._keep(theta, joined(values, samples))
         return self.windows.transform(joined(slopes, samples, len(indices)))

@@ -31,7 +31,7 @@ def search_onset(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
     if not places:
         return fit
     problem, place = VariableProjection(fit), places[0]
-    best = (problem.deviance(problem.residual(fit.values)), fit.values)
+    best = (problem.deviance(fit.values), fit.values)
     end = max(float(model.record.duration) for model in fit.models)
     best = _best_of(problem, best, place, np.arange(0.0, end, _COARSE))
     best = _best_of(problem, best, place, best[1][place] + np.arange(-_REACH, _REACH, _FINE))
@@ -88,4 +88,4 @@ def _at(problem: VariableProjection, values: Array, place: int, time: float) -> 
     low, high = bounds(problem.fit.simulator, problem.indices)
     stepped = np.clip(there + np.linalg.lstsq(slopes, -problem.residual(there), rcond=None)[0], low, high)
     stepped[place] = time
-    return min(((problem.deviance(problem.residual(v)), v) for v in (there, stepped)), key=lambda pair: pair[0])
+    return min(((problem.deviance(v), v) for v in (there, stepped)), key=lambda pair: pair[0])

@@ -53,7 +53,7 @@ def screened(fit: CandidateFit, problem: VariableProjection, candidate: Candidat
     if not candidate.indices:
         widened = with_candidates(fit, [*fit.candidates, candidate], fit.nuisances, ())
         problem = VariableProjection(widened)
-        return Screened(problem.deviance(problem.residual(widened.values)), candidate, ())
+        return Screened(problem.deviance(widened.values), candidate, ())
     low, high = bounds(fit.simulator, (*fit.indices, *candidate.indices))
     best = Screened(np.inf, candidate, candidate.starts[0])
     extended = problem.with_candidate(candidate)
@@ -62,8 +62,8 @@ def screened(fit: CandidateFit, problem: VariableProjection, candidate: Candidat
         residual = extended.residual_and_slopes(values)
         step = np.linalg.lstsq(extended.jacobian(values), -residual, rcond=None)[0]
         stepped = np.clip(values + step, low, high)
-        for tried, left in ((values, residual), (stepped, extended.residual(stepped))):
-            deviance = extended.deviance(left)
+        for tried in (values, stepped):
+            deviance = extended.deviance(tried)
             if deviance < best.deviance:
                 best = Screened(deviance, candidate, tuple(tried[fit.values.size :].tolist()))
     return _with_derivatives_released(fit, problem, best)
@@ -80,7 +80,7 @@ def _with_derivatives_released(fit: CandidateFit, problem: VariableProjection, f
     extended = problem.with_candidate(found.candidate)
     limits = bounds(fit.simulator, (*fit.indices, *found.candidate.indices))
     values = extended.joint_start(np.concatenate([fit.values, found.start]), *limits)
-    deviance = extended.deviance(extended.residual(values))
+    deviance = extended.deviance(values)
     if not deviance < found.deviance:
         return found
     return Screened(deviance, found.candidate, tuple(values[fit.values.size :].tolist()))

@@ -89,8 +89,8 @@ def _added(fitter: CandidateFitter, fit: CandidateFit, new: Screened) -> Candida
 
 def _penalised_deviance(fit: CandidateFit) -> float:
     """Minus twice the log posterior density, and a penalty for each effect and parameter."""
-    powers = [(np.abs(flight.residual) ** 2).mean(axis=0) for flight in fit.flights]
-    deviance = sum(spectral_deviance(model, power) for model, power in zip(fit.models, powers, strict=True))
+    powers = ((flight, (np.abs(flight.residual) ** 2).mean(axis=0)) for flight in fit.flights)
+    deviance = sum(spectral_deviance(flight.model, power, flight.point) for flight, power in powers)
     return deviance - 2.0 * fit.prior_score + _PENALTY * (len(fit.candidates) + len(fit.indices))
 
 

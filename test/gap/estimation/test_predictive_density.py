@@ -85,9 +85,9 @@ def test_the_noise_of_a_flight_not_fitted_is_estimated_by_channel() -> None:
     slopes = np.zeros((4, 200, 12, 1))
     slopes[..., 7, 0] = random.standard_normal((4, 200))
     rows[..., 7] += 30.0 * slopes[..., 7, 0]
-    levels = noise_levels(rows.reshape(4, -1), slopes.reshape(4, -1, 1), np.array([[1e-4]]))
+    levels = noise_levels(rows.reshape(4, -1), slopes.reshape(4, -1, 1), np.array([[1e-4]]), np.zeros(12))
     assert levels[3] == pytest.approx(2.0 * np.mean(rows[..., 3] ** 2))
     assert levels[5] == 1.0
     assert np.delete(levels, 3) == pytest.approx(1.0, abs=0.15)
-    known = noise_levels(rows.reshape(4, -1), slopes.reshape(4, -1, 1), np.array([[1e9]]))
+    known = noise_levels(rows.reshape(4, -1), slopes.reshape(4, -1, 1), np.array([[1e9]]), np.zeros(12))
     assert known[7] > 500.0  # an unknown that the fit knows does not move

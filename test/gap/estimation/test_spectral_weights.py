@@ -47,12 +47,15 @@ def test_slopes_are_weighted_as_residuals_are(windows) -> None:
 
 def test_power_is_at_least_the_sensors_noise(plain_model) -> None:
     nothing = np.zeros(plain_model.measured.shape, complex)
-    np.testing.assert_array_equal(residual_power(plain_model, nothing), plain_model.noise)
+    np.testing.assert_array_equal(
+        residual_power(plain_model, nothing, plain_model.simulator.neutral()), plain_model.noise
+    )
 
 
 def test_the_deviance_of_more_power_is_more(plain_model) -> None:
     """Of power P above the noise it is, up to a constant, as many logarithms of P as there are data."""
     power = 100.0 * plain_model.noise
-    change = spectral_deviance(plain_model, np.e * power) - spectral_deviance(plain_model, power)
+    more, less = (spectral_deviance(plain_model, p, plain_model.simulator.neutral()) for p in (np.e * power, power))
+    change = more - less
     lines = power.shape[0] - 0.5  # the mean has no imaginary part
     assert change == pytest.approx(plain_model.windows.count * lines * power.shape[1])
