@@ -38,6 +38,8 @@ def check_frequencies(frequencies: tuple[float, float, float]) -> None:
     start, step, stop = frequencies
     if not (0.0 < start < stop and step > 0.0 and math.isfinite(stop)):
         raise InputError(f"frequencies {start:g}:{step:g}:{stop:g}: expected 0 < start < stop and step > 0, in Hz")
+    if start + step > stop * (1.0 + 1e-9):
+        raise InputError(f"frequencies {start:g}:{step:g}:{stop:g}: expected two lines or more; narrow the step")
     if start < LOWEST or stop > HIGHEST or (stop - start) / step > MOST_LINES:
         raise InputError(
             f"frequencies {start:g}:{step:g}:{stop:g}: expected {LOWEST:g} to {HIGHEST:g} Hz and"

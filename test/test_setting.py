@@ -50,6 +50,13 @@ def test_frequencies_must_rise_from_above_zero(frequencies: Frequencies) -> None
         check_frequencies(frequencies)
 
 
+@pytest.mark.parametrize("frequencies", [(0.1, 5.0, 2.0), (3.0, 999.0, 1000.0)])
+def test_a_spectrum_has_two_lines_or_more(frequencies: Frequencies) -> None:
+    with pytest.raises(InputError, match="expected two lines or more"):
+        check_frequencies(frequencies)
+    check_frequencies((0.1, 0.1, 0.2))
+
+
 @pytest.mark.parametrize("text", ["1e-300:1e-300:1e-299", "1e300:1e300:1e301", "0.1:1e-300:1"])
 def test_frequencies_that_no_flight_has_or_too_many_are_refused(text):
     with pytest.raises(InputError, match=r"at most 100000 lines"):

@@ -61,6 +61,19 @@ def test_truncated_and_damaged_logs(tmp_path):
         load_flight_record(tmp_path / "head.bin", aircraft())
 
 
+def test_a_type_of_message_without_length_is_refused(tmp_path):
+    """Its FMT message has the length after the type, then name and format; pymavlink would read it for ever."""
+    dataflash_log(tmp_path / "flight.bin")
+    damaged = bytearray((tmp_path / "flight.bin").read_bytes())
+    name = damaged.index(b"IMU\x00")
+    assert damaged[name - 5 : name - 2] == b"\xa3\x95\x80"
+    damaged[name - 1] = 0
+    damaged[name + 4 : name + 20] = bytes(16)
+    (tmp_path / "loop.bin").write_bytes(damaged)
+    with pytest.raises(InputError, match=r"loop\.bin: cannot be read as an ArduPilot log: a message without length"):
+        load_flight_record(tmp_path / "loop.bin", aircraft())
+
+
 def test_outputs_of_the_aircraft_file_replace_the_logs_parameters(tmp_path):
     record = dataflash_log(tmp_path / "flight.bin")
     made = replace(aircraft(), outputs="elevator=out2:1480:0.0008 aileron=out1:1500:-0.000875 rudder=out4:1500:0.0008")

@@ -44,12 +44,29 @@ def read_dataflash(path: str | Path, *, text: bool = False) -> AutopilotLog:
     reader = required("pymavlink.DFReader", "ArduPilot's logs")
     try:
         with quietly():  # pymavlink prints every byte that it skips in a damaged file
-            log = (reader.DFReader_text if text else reader.DFReader_binary)(str(path))
+            log = (reader.DFReader_text if text else _advancing(reader.DFReader_binary))(str(path))
             rows = _rows(log)
     except Exception as error:  # the parser of a damaged file raises all kinds of exceptions
         words = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path.name}: cannot be read as an ArduPilot log: {words}; copy it again") from error
     return _converted(rows, path.name)
+
+
+def _advancing(reader: Any) -> Any:
+    """The class of a reader that raises ValueError where a message takes no bytes.
+
+    A damaged log may state so of a type of message; pymavlink would then read the same message for ever.
+    """
+
+    class Advancing(reader):  # type: ignore[misc]
+        def recv_msg(self) -> Any:
+            before = self.offset
+            message = super().recv_msg()
+            if message is not None and self.offset <= before:
+                raise ValueError(f"a message without length at byte {self.offset}")
+            return message
+
+    return Advancing
 
 
 def _rows(log: Any) -> Rows:
