@@ -34,6 +34,10 @@ class Geometry:
     cbar: float
 
 
+#: Least and greatest airspeed of an aircraft, m/s.
+AIRSPEEDS = (0.1, 10_000.0)
+
+
 @dataclass(frozen=True)
 class ReferenceCondition:
     """The flight condition for which the derivatives hold: true airspeed (m/s), air density (kg/m^3)."""

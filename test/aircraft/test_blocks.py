@@ -150,7 +150,11 @@ def test_a_right_file_gives_no_warning():
 
 # what to replace, by what, and what the one line must hold
 MISTAKES = [
-    ("mass: {value: 3.0,", "mass: {value: -3.0,", "f.yaml:2: mass.value: got -3.0, expected a positive number (kg)"),
+    (
+        "mass: {value: 3.0,",
+        "mass: {value: -3.0,",
+        "f.yaml:2: mass.value: got -3.0, expected a positive number (kg, 1e-9 to 1e9)",
+    ),
     ("tolerance: 0.02}", "tolerance: -1}", "f.yaml:2: mass.tolerance: got -1, expected 1 sigma in the value's unit"),
     (
         "tolerance: 0.02}",

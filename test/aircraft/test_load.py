@@ -74,7 +74,7 @@ def test_inertia_may_be_left_out():
 
 # what to replace, by what, and what the one line must hold
 MISTAKES = [
-    ("mass: 3.0", "mass: -3.0", ("f.yaml:3: mass: got -3.0, expected a positive number (kg)",)),
+    ("mass: 3.0", "mass: -3.0", ("f.yaml:3: mass: got -3.0, expected a positive number (kg, 1e-9 to 1e9)",)),
     ("mass: 3.0", 'mass: "3.0"', ("mass: got the text '3.0'",)),
     ("mass: 3.0", "mass: 3 kg", ("mass: got 3 kg",)),
     ("mass: 3.0", "mass: .nan", ("mass: got .nan",)),
@@ -92,6 +92,7 @@ MISTAKES = [
     ("Izz: 0.3", "Izz: 0.9", ("f.yaml:4: inertia: no rigid body has Izz = 0.9 > Ixx + Iyy = 0.35",)),
     ("Ixz: 0.01", "Ixz: 1e300", ("inertia: no rigid body has Ixz^2 = inf >= Ixx Izz",)),
     ("Ixz: 0.01", "Ixz: 0.3", ("inertia: no rigid body has Ixz^2 = 0.09 >= Ixx Izz = 0.06",)),
+    ("airspeed: 18.0", "airspeed: 1e-300", ("got 1e-300, expected a positive number (m/s, 0.1 to 10000)",)),
     ("Iyy: 0.15", "Iyy: 0.0", ("inertia.Iyy: got 0.0, expected a positive number",)),
     ("air_density: 1.2", "air_density: 1200", ("reference.air_density: got 1200",)),
     ("air_density: 1.2", "air_density: 1e-300", ("reference.air_density: got 1e-300",)),

@@ -7,7 +7,7 @@ import warnings
 
 from sysid_node.aircraft.default_tolerances import DEFAULT_NOISE_BIAS
 from sysid_node.aircraft.document import DocumentEntry
-from sysid_node.aircraft.model import DEFAULT_NOISE, Geometry, Inertia, ReferenceCondition, Sensors, Vector3
+from sysid_node.aircraft.model import AIRSPEEDS, DEFAULT_NOISE, Geometry, Inertia, ReferenceCondition, Sensors, Vector3
 from sysid_node.aircraft.reading.quantities import Quantities, any_number, positive
 from sysid_node.errors import ModelWarning
 
@@ -66,7 +66,7 @@ def read_reference(entry: DocumentEntry) -> ReferenceCondition:
     """The flight condition of the derivatives. Raises InputError."""
     fields = entry.fields({"airspeed": "the true airspeed in m/s", "air_density": "the air density in kg/m^3"})
     return ReferenceCondition(
-        airspeed=positive("m/s")(fields["airspeed"]),
+        airspeed=positive("m/s", *AIRSPEEDS)(fields["airspeed"]),
         air_density=fields["air_density"].number("an air density (0.001 to 2 kg/m^3)", lambda x: 1e-3 <= x < 2),
     )
 

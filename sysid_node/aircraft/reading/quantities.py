@@ -41,9 +41,14 @@ def _not_negative(x: float) -> bool:
     return x >= 0
 
 
-def positive(unit: str) -> ReadNumber:
-    """A reader of positive numbers."""
-    return lambda entry: entry.number(f"a positive number ({unit})", lambda x: x > 0)
+#: Least and greatest positive number, in SI units, that anything about an aircraft can have.
+_LEAST, _GREATEST = 1e-9, 1e9
+
+
+def positive(unit: str, least: float = _LEAST, greatest: float = _GREATEST) -> ReadNumber:
+    """A reader of positive numbers within a range."""
+    expected = f"a positive number ({unit}, {least:g} to {greatest:g})".replace("e-0", "e-").replace("e+0", "e")
+    return lambda entry: entry.number(expected, lambda x: least <= x <= greatest)
 
 
 def any_number(unit: str) -> ReadNumber:

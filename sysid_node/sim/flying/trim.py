@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from sysid_node.aircraft.model import AIRSPEEDS
 from sysid_node.dynamics.airflow import velocity_of
 from sysid_node.dynamics.atmosphere import GRAVITY, altitude_of
 from sysid_node.dynamics.attitude import quaternion, to_earth
@@ -68,8 +69,9 @@ def trim_flight(
     """
     reference = simulator.aircraft.reference
     speed = reference.airspeed if airspeed is None else airspeed
-    if not (np.isfinite(speed) and speed > 0.0):
-        raise InputError(f"trim: airspeed {speed:g} m/s: expected more than zero")
+    least, greatest = AIRSPEEDS
+    if not least <= speed <= greatest:
+        raise InputError(f"trim: airspeed {speed:g} m/s: expected {least:g} to {greatest:g} m/s")
     height = altitude_of(reference.air_density) if altitude is None else altitude
     point = TrimPoint(jnp.asarray(speed), jnp.asarray(height), jnp.asarray(heading))
     vector = simulator.neutral() if theta is None else theta
