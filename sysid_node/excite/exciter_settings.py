@@ -14,7 +14,7 @@ class ExcitationSettings:
 
     manoeuvre: tuple[str, ...] = ("multisine:elevator,aileron,rudder:amplitude=0.02:length=15:low=0.15:high=1.9",)
     derivatives: tuple[str, ...] = ("Cm_alpha", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr")
-    accuracy: float = 0.05  # half the 95 % interval over the derivative's size
+    accuracy: float = 0.05  # statistical part of half the 95 % interval, over the size
     longest: float = 60.0  # s, after which it stops in any case
     watch: bool = False  # begin again when a derivative is no longer valid
     largest_amplitude: float = 0.1  # rad

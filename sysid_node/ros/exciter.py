@@ -55,7 +55,12 @@ PARAMETERS = (
         "Whether it begins again by itself when one of them is no longer known, or a fault is reported.",
         "true beside an adaptive controller.",
     ),
-    _setting("accuracy", "", "Half of an interval over the derivative's size, with which it is known.", "As needed."),
+    _setting(
+        "accuracy",
+        "",
+        "Statistical part of half of an interval, over the derivative's size, with which it is known.",
+        "As needed.",
+    ),
     _setting("longest", "s", "It gives up after so long.", "Up in rough air."),
     _setting("largest_amplitude", "rad", "Largest deflection.", "To what the aircraft bears."),
     _setting("largest_roll", "rad", "Roll beyond which it aborts.", "For every aircraft."),

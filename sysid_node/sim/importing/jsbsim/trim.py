@@ -54,6 +54,8 @@ def default_airspeeds(program: Program, state: Flight) -> list[float]:
     area, _, _ = program.geometry
     program.put(replace(state, airspeed=50.0), {})
     density = program.loads().density
+    if not density * area > 0.0:
+        raise InputError(f"wing area {area:g} m^2 in air of {density:g} kg/m^3: no airspeed is enough; check the area")
     return [float(np.sqrt(2.0 * program.mass * GRAVITY / (density * area * lift))) for lift in (0.4, 0.25, 0.6, 0.15)]
 
 
