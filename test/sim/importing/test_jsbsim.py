@@ -120,6 +120,15 @@ def test_what_cannot_be_read_is_one_line(model, airspeed, said):
     assert "\n" not in str(error.value)
 
 
+def test_a_model_without_wing_area_is_one_line(tmp_path):
+    text = find_model("c172p").main.read_text()
+    area = '<wingarea unit="FT2"> 174 </wingarea>'
+    assert area in text
+    (tmp_path / "c172p.xml").write_text(text.replace(area, area.replace("174", "0")))
+    with pytest.raises(InputError, match=r"wing area 0 m\^2 in air of .*: no airspeed is enough; check the area"):
+        read_jsbsim(str(tmp_path / "c172p.xml"))
+
+
 def test_a_property_that_is_not_there_is_one_line_and_no_abort(tmp_path):
     """JSBSim throws when it runs, and again when the model is destroyed, at the end of the process."""
     text = find_model("c172p").main.read_text()
