@@ -116,6 +116,7 @@ MISTAKES = [
     ("[0.1, 0.0, -0.02]", "[0.1, 0.0]", ("sensors.imu: got 2 values, expected three",)),
     ("[0.1, 0.0, -0.02]", "[0.1, 0.0, aft]", ("sensors.imu[2]: got aft",)),
     ("gyro: 0.002", "gyro: -0.002", ("noise.gyro: got -0.002",)),
+    ("gyro: 0.002", "gyro: 1e300", ("noise.gyro: got 1e300", "not negative (up to 1e9)")),
     ("gyro: 0.002", "gyros: 0.002", ("noise.gyros: unknown key", "did you mean 'gyro'?")),
     ("tolerance: 0.05", "tolerance: -0.05", ("f.yaml:20: derivatives.Cm_alpha.tolerance: got -0.05",)),
     ("tolerance: 0.05", "tolerance: 1e-300", ("derivatives.Cm_alpha.tolerance: got 1e-300, expected at least 1e-09",)),

@@ -8,7 +8,7 @@ import warnings
 from sysid_node.aircraft.default_tolerances import DEFAULT_NOISE_BIAS
 from sysid_node.aircraft.document import DocumentEntry
 from sysid_node.aircraft.model import AIRSPEEDS, DEFAULT_NOISE, Geometry, Inertia, ReferenceCondition, Sensors, Vector3
-from sysid_node.aircraft.reading.quantities import Quantities, any_number, positive
+from sysid_node.aircraft.reading.quantities import GREATEST, Quantities, any_number, positive
 from sysid_node.errors import ModelWarning
 
 
@@ -87,7 +87,7 @@ def _place(entry: DocumentEntry, key: str, quantities: Quantities) -> Vector3:
 
 
 def _sigma(entry: DocumentEntry) -> float:
-    return entry.number("a number, 1 sigma, not negative", lambda x: x >= 0)
+    return entry.number("a number, 1 sigma, not negative (up to 1e9)", lambda x: 0 <= x <= GREATEST)
 
 
 def read_noise(entry: DocumentEntry | None) -> dict[str, float]:

@@ -42,10 +42,10 @@ def _not_negative(x: float) -> bool:
 
 
 #: Least and greatest positive number, in SI units, that anything about an aircraft can have.
-_LEAST, _GREATEST = 1e-9, 1e9
+_LEAST, GREATEST = 1e-9, 1e9
 
 
-def positive(unit: str, least: float = _LEAST, greatest: float = _GREATEST) -> ReadNumber:
+def positive(unit: str, least: float = _LEAST, greatest: float = GREATEST) -> ReadNumber:
     """A reader of positive numbers within a range."""
     expected = f"a positive number ({unit}, {least:g} to {greatest:g})".replace("e-0", "e-").replace("e+0", "e")
     return lambda entry: entry.number(expected, lambda x: least <= x <= greatest)
