@@ -159,13 +159,11 @@ class CandidateFit:
         squares = float(np.sum((now / spread) ** 2) + np.sum(((self.values - centre) / sigma) ** 2))
         return -0.5 * squares - self.log_widening
 
-    @property
-    def noise_pull(self) -> Array:
-        """Pull (unknowns,) on all unknowns that corrects for the noise of the regressors, see ``noise_pull``."""
-        return self.noise_pull_on(self.indices)
-
     def noise_pull_on(self, indices: Sequence[int]) -> Array:
-        """The same with other entries of the parameter vector in place of those that the candidates fit."""
+        """Pull (unknowns,) that corrects for the noise of the regressors, see ``spectral_weights.noise_pull``.
+
+        ``indices`` are the entries of the parameter vector that come before the nuisance parameters.
+        """
         pull = np.zeros(len(indices) + self.stacked[0].size)
         for number, flight in enumerate(self.flights):
             entries, count = [*indices, *flight.nuisances.indices], flight.model.windows.count
