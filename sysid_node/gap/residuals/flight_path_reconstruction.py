@@ -25,7 +25,7 @@ from sysid_node.dynamics.rigid_body import velocity_rate
 from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim.effects import air_data_lag, imu_misalignment
-from sysid_node.sim.effects.actuator_lag import first_order
+from sysid_node.sim.effects.actuator_lag import first_order_series
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar, Values
 from sysid_node.sim.model.parameters import Parameters
@@ -196,22 +196,10 @@ def _air_rotation(chain: Chain, samples: Sample, velocity: Vector, vanes: Scalar
     unexplained = [slope(angle, chain.step) - rate for angle, rate in zip(angles, by_motion, strict=True)]
     size = chain.model.span / (jnp.pi * speed.mean())
     pitch, yaw = (
-        share * _lagged(lag * size, rate, chain.step)
+        share * first_order_series(lag * size, rate, chain.step, jnp.zeros(()))
         for share, lag, rate in zip(vanes, (4.0, 3.0), unexplained, strict=True)
     )
     return Vector(jnp.zeros_like(speed), pitch, -yaw)
-
-
-def _lagged(time_constant: Scalar, series: Scalar, step: Scalar) -> Scalar:
-    """A series (N,) through a first-order lag that begins at rest."""
-
-    def advance(last: Scalar, pair: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
-        now = first_order(time_constant, last, *pair, step)
-        return now, now
-
-    before = jnp.concatenate([series[:1], series[:-1]])
-    _, lagging = jax.lax.scan(advance, jnp.zeros(()), (before, series))
-    return lagging
 
 
 def _followed(seen: Vector, moving: Vector, memory: Scalar | float, step: Scalar) -> tuple[Vector, Vector]:

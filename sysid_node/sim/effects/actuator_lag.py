@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from sysid_node.sim.effects.base import Effect, SimulationParameter, each_control
@@ -84,3 +85,15 @@ def first_order(tau: Scalar, x: Scalar, u0: Scalar, u1: Scalar, step: Scalar) ->
     decay = jnp.exp(-step / jnp.maximum(tau, step / 50.0))
     ramp = tau / step * (1.0 - decay)
     return decay * x + (ramp - decay) * u0 + (1.0 - ramp) * u1
+
+
+def first_order_series(tau: Scalar, series: Scalar, step: Scalar, start: Scalar) -> Scalar:
+    """A series (N, ...) through ``first_order``, from an output ``start`` (...) before the first sample."""
+
+    def advance(last: Scalar, pair: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+        now = first_order(tau, last, *pair, step)
+        return now, now
+
+    before = jnp.concatenate([series[:1], series[:-1]])
+    lagging: Scalar = jax.lax.scan(advance, start, (before, series))[1]
+    return lagging

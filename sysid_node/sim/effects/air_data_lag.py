@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import jax
-import jax.numpy as jnp
-
-from sysid_node.sim.effects.actuator_lag import first_order
+from sysid_node.sim.effects.actuator_lag import first_order, first_order_series
 from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
@@ -26,14 +23,8 @@ def advance(values: Values, y: Scalar, truth0: Scalar, truth1: Scalar, step: Sca
 
 def behind(values: Values, rate: Scalar, step: Scalar) -> Scalar:
     """Truth minus lagged flow (N, 3), from the truth's rate (N, 3) in units per s; settled on the first sample."""
-
-    def advance_one(lag: Scalar, pair: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
-        lag = first_order(values["time_constant"], lag, *pair, step)
-        return lag, lag
-
-    before = jnp.concatenate([rate[:1], rate[:-1]])
-    _, lagging = jax.lax.scan(advance_one, rate[0], (before, rate))
-    return values["time_constant"] * lagging
+    time_constant = values["time_constant"]
+    return time_constant * first_order_series(time_constant, rate, step, rate[0])
 
 
 def undo(values: Values, y: Scalar, rate: Scalar) -> Scalar:
