@@ -5,7 +5,8 @@ accepted where all of these hold:
 
 1. it is not a time within one sample of the slowest topic, which is a matter of sampling, and not larger than real
    parts show;
-2. with it the explanation predicts flight that was not fitted better, beyond doubt;
+2. with it the explanation predicts flight that was not fitted better, beyond doubt; a bias beyond what the file states
+   of it, which fitted derivatives can stand in for, need only predict no worse;
 3. it matters by one of these: on some channel of forces, moments and kinematics it removes a share of the remainder,
    and a share of the whole gap comes back without it; it removes such a share of the error of some reading of short
    simulated flights, in which what an instrument does adds up; the derivatives are much more probable together with it,
@@ -173,7 +174,7 @@ def rejection(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> 
     implausible = _implausibility(scores, thresholds)
     if implausible is not None:
         return implausible
-    if not predicts_better(scores.probability, thresholds):
+    if not _predicts_well_enough(scores, thresholds):
         return "it does not predict better beyond doubt"
     if not _is_large(scores, limits):
         return "it removes too little"
@@ -197,6 +198,17 @@ def _implausibility(scores: ComparisonScores, thresholds: Thresholds) -> str | N
     if added.time is not None and abs(added.time) < added.sample_period:
         return "its time is within one sample"
     return "no real part is off so far" if added.largest > thresholds.acceptance.plausible else None
+
+
+def _predicts_well_enough(scores: ComparisonScores, thresholds: Thresholds) -> bool:
+    """Whether the candidate passes rule 2.
+
+    A constant error of an instrument is a constant in the coefficients, and derivatives within their tolerances can be
+    bent to that as well. That they need not be is seen by the log Bayes factor, in which their priors are.
+    """
+    if predicts_better(scores.probability, thresholds):
+        return True
+    return scores.probability >= 0.5 and scores.added.bias > thresholds.acceptance.bias
 
 
 def predicts_better(probability: float, thresholds: Thresholds = THRESHOLDS) -> bool:

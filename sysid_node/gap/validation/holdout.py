@@ -27,6 +27,7 @@ from sysid_node.gap.validation.standing import (
     causes_stand,
     file_derivatives_suit_causes,
     file_predicts_better,
+    is_needless,
     shares_taken_away,
 )
 
@@ -138,7 +139,7 @@ def standing_explanation(attribution: Attribution, validator: Validator) -> tupl
 
     In this order: all causes; the same with the sizes of least squares; without one of the causes, without two; no
     cause. Each is also tried with the file's own derivatives, and kept so where these predict better. An explanation
-    whose predictions are not finite is passed over.
+    whose predictions are not finite is passed over. What stands is left without the causes that are needless there.
     """
     for explanation in _explanations(attribution):
         try:
@@ -146,10 +147,35 @@ def standing_explanation(attribution: Attribution, validator: Validator) -> tupl
         except np.linalg.LinAlgError:
             continue
         found = _with_better_derivatives(*found, validator)
-        if causes_stand(found[1].gaps, excused=not found[0].relieves_derivatives):
-            return found
+        if _stands(*found):
+            return _without_needless_causes(*found, validator)
     bare = attribution.without_causes()
     return bare, validator(bare)
+
+
+def _stands(attribution: Attribution, checked: Check) -> bool:
+    return causes_stand(checked.gaps, excused=not attribution.relieves_derivatives)
+
+
+def _without_needless_causes(
+    attribution: Attribution, checked: Check, validator: Validator
+) -> tuple[Attribution, Check]:
+    """The explanation with the fewest causes that predicts at least as well by every measure, of these the best.
+
+    Only where the derivatives are the file's: fitted ones may move in a cause's place.
+    """
+    if not attribution.keeps_file_derivatives or len(attribution.causes) < 2:
+        return attribution, checked
+    fewer = []
+    for smaller in attribution.with_fewer_causes():
+        try:
+            found = validator(smaller.with_file_derivatives())
+            if is_needless(checked.gaps, found.gaps):
+                whole = _with_better_derivatives(smaller, validator(smaller), validator)
+                fewer.extend([whole] if whole[0].keeps_file_derivatives and _stands(*whole) else [])
+        except np.linalg.LinAlgError:
+            continue
+    return min(fewer, key=lambda each: (len(each[0].causes), each[1].gaps[-1].after), default=(attribution, checked))
 
 
 def _explanations(attribution: Attribution) -> Iterator[Attribution]:

@@ -56,12 +56,25 @@ def causes_stand(errors: Sequence[Errors], *, excused: bool = True, thresholds: 
     return any(e.after < most * e.tolerances for e in errors) and all(e.after < worst * e.before for e in errors)
 
 
-def file_predicts_better(errors: Sequence[Errors]) -> bool:
+def file_predicts_better(errors: Sequence[Errors], thresholds: Thresholds = THRESHOLDS) -> bool:
     """Whether the file predicts better than the fitted derivatives, by at least one measure.
 
-    In gusts derivatives that these have biased may predict better by frequency.
+    In gusts derivatives that these have biased may predict better by frequency. Where the fitted derivatives take away
+    a large share of the error by the last measure, that of short flights, they may tie with the file by the other.
     """
-    return any(e.tolerances > e.before for e in errors)
+    limits = thresholds.validation
+    large = errors[-1].tolerances < limits.large_improvement * errors[-1].before
+    worst = limits.tie if large else 1.0
+    return any(e.tolerances > worst * e.before for e in errors)
+
+
+def is_needless(with_it: Sequence[Errors], without: Sequence[Errors]) -> bool:
+    """Whether flight that was not fitted is predicted at least as well without a cause, by every measure.
+
+    Both have the file's derivatives, so that nothing has moved in the cause's place. What a cause explains of the
+    flights fitted, and of no other flight, is an error of the model there.
+    """
+    return all(less.after <= more.after for less, more in zip(without, with_it, strict=True))
 
 
 def file_derivatives_suit_causes(
