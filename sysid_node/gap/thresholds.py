@@ -175,7 +175,9 @@ class Search:
     )
     per_effect: int = _threshold(2, "1", "candidates of one effect that are fitted upon one explanation, at most")
     penalty: float = _threshold(
-        10.0, "1", "deviance by which a variant of an effect must be better for each parameter that it has more"
+        10.0,
+        "1",
+        "deviance by which a variant of an effect, or one with an onset, must be better for each parameter more",
     )
     alternatives: int = _threshold(4, "1", "alternatives to a cause that are fitted")
     sweeps: int = _threshold(3, "1", "times that all causes are compared with their alternatives, at most")

@@ -16,6 +16,7 @@ from sysid_node.gap.instruments.gust_free_signals import command_instruments
 from sysid_node.gap.instruments.moment_equations import limited_step, moment_equations
 from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.parameter_priors import bounds
+from sysid_node.gap.thresholds import THRESHOLDS
 
 #: Coarse and fine steps between the times that are tried, and how far about the best the fine ones reach, s.
 _COARSE, _FINE, _REACH = 1.5, 0.25, 1.75
@@ -25,7 +26,11 @@ _LIKELIHOOD_STEP = 0.5
 
 
 def search_onset(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
-    """The fit with the onset of one of its candidates at the least deviance; the fit itself where none is less."""
+    """The fit with the onset of one of its candidates at the least deviance; the fit itself where none is less.
+
+    That the effect was there before the flight needs no onset. It is kept unless an onset is better by the penalty of
+    one more parameter: while a surface is at rest, any time would do.
+    """
     names = fit.simulator.names
     places = [fit.indices.index(i) for i in candidate.indices if names[i].endswith(".onset")]
     if not places:
@@ -35,8 +40,9 @@ def search_onset(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
     end = max(float(model.record.duration) for model in fit.models)
     best = _best_of(problem, best, place, np.arange(0.0, end, _COARSE))
     best = _best_of(problem, best, place, best[1][place] + np.arange(-_REACH, _REACH, _FINE))
-    values = best[1]
-    if values is fit.values:
+    throughout = _at(problem, best[1], place, float(fit.simulator.neutral()[fit.indices[place]]))
+    values = throughout[1] if throughout[0] <= best[0] + THRESHOLDS.search.penalty else best[1]
+    if np.array_equal(values, fit.values):
         return fit
     points = [flight.point.copy() for flight in fit.flights]
     for point in points:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.gap.spikes import diagnosed
 from bench.spikes import ledger, scores
 from bench.spikes.drawing import SETS, Case, draw
 from bench.spikes.editing import EFFECTS, edited, misbelieved
@@ -156,3 +157,20 @@ def test_the_belief_has_the_derivatives_that_the_field_finds() -> None:
 def test_the_belief_states_the_noise_that_the_record_shows() -> None:
     """Of the HFB-320's pitch rate the upper third of the spectrum (3.5 to 5 Hz) has the power of 0.0003 to 0.0005."""
     assert 3e-4 < belief(RECORDS, FLIGHTS["hfb320"]).noise["gyro"] < 5e-4
+
+
+@pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
+def test_what_explains_nothing_of_parts_not_fitted_is_not_named_beside_what_was_put_in() -> None:
+    """The gyroscopes' scale improves the fit beside the airspeed, but parts that were not fitted are further off."""
+    line = diagnosed(RECORDS, Case(0, "attas", "airspeed_scale", {"error": 0.16}))
+    (cause,) = line["causes"]
+    assert cause["effect"] == "airspeed_scale"
+    assert cause["parameters"]["error"][0] == pytest.approx(0.16, rel=0.2)
+
+
+@pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
+def test_a_file_of_another_mass_is_left_for_derivatives_that_fly_the_record() -> None:
+    """By frequency both predict alike; in short flights the file is off by several times the motion."""
+    gap = diagnosed(RECORDS, Case(0, "hfb320", "mass_error", {"error": 0.25}))["gap"]
+    assert gap["before"] > 5.0
+    assert gap["after"] < 0.2 * gap["before"]

@@ -124,6 +124,8 @@ def table(**changes: object) -> ComparisonTable:
         ({"channels": LITTLE, "added": added(bias=LIMITS.bias)}, "too little"),
         ({"channels": hidden(removed(0.1, 0.01))}, None),
         ({"channels": hidden(removed(0.1, 0.09))}, "too little"),
+        ({"probability": 0.5, "added": added(bias=LIMITS.bias + 1e-9)}, None),  # derivatives can be bent to a bias
+        ({"probability": 0.49, "added": added(bias=LIMITS.bias + 1e-9)}, "predict better"),
         ({"log_bayes_factor": 0.0}, "commands"),
         ({"log_bayes_factor": np.nan}, "commands"),
     ],

@@ -22,6 +22,7 @@ class Explanation:
     causes: tuple[str, ...] = ("a cause",)
     smaller: tuple[float, ...] = ()  # with fewer causes
     relieves_derivatives: bool = False
+    keeps_file_derivatives: bool = False
 
     def by_least_squares(self) -> "Explanation":
         return Explanation(self.chosen.fit)

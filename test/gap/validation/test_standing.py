@@ -12,6 +12,7 @@ from sysid_node.gap.validation.standing import (
     causes_stand,
     file_derivatives_suit_causes,
     file_predicts_better,
+    is_needless,
     shares_taken_away,
     weather_accounts_for,
 )
@@ -65,6 +66,30 @@ def test_what_causes_take_away_of_a_reading_on_other_flight_is_no_weather() -> N
 def test_the_file_predicts_better_by_one_measure(tolerances: float, better: bool) -> None:
     worse = GOOD._replace(tolerances=tolerances)
     assert file_predicts_better([worse]) is file_predicts_better([GOOD, worse]) is better
+
+
+@pytest.mark.parametrize(
+    ("by_frequency", "of_short_flights", "better"),
+    [
+        (1.04, 0.69, False),  # a tie beside a large improvement on short flights
+        (1.06, 0.69, True),
+        (1.04, 0.71, True),  # beside a small one
+        (0.69, 1.04, True),  # gusts bias derivatives, which then predict better by frequency
+    ],
+)
+def test_a_tie_by_frequency_does_not_keep_a_file_that_flies_far_off(
+    by_frequency: float, of_short_flights: float, better: bool
+) -> None:
+    errors = [ErrorTable(1.0, by_frequency, 0.1), ErrorTable(1.0, of_short_flights, 0.1)]
+    assert file_predicts_better(errors) is better
+
+
+@pytest.mark.parametrize(
+    ("without", "needless"),
+    [((0.1, 0.1), True), ((0.05, 0.09), True), ((0.11, 0.05), False), ((0.05, 0.11), False)],
+)
+def test_a_cause_is_needless_where_no_measure_is_worse_without_it(without: tuple[float, ...], needless: bool) -> None:
+    assert is_needless([GOOD, GOOD], [GOOD._replace(after=after) for after in without]) is needless
 
 
 @pytest.mark.parametrize(("after", "suit"), [(0.3, True), (0.4, False), (0.5, False)])
