@@ -14,6 +14,8 @@ from sysid_node.errors import InputError
 from sysid_node.flight.checks import ANGLE_LIMIT, joint_fault, throttle_fault, throttle_limit
 from sysid_node.flight.record import Array
 
+NAMED = 12  # joints that a message lists
+
 
 @dataclass(frozen=True)
 class Actuation:
@@ -91,6 +93,12 @@ class Actuation:
         missing = [joint for joint in self.joints if joint not in names]
         if missing:
             raise InputError(
-                f"{flight}: actuators have no joint {', '.join(map(repr, missing))}; they have "
-                f"{', '.join(map(repr, names)) or 'none'}; name them so under controls in the aircraft file"
+                f"{flight}: actuators have no joint {_few(missing)}; they have {_few(names) or 'none'}; "
+                "name them so under controls in the aircraft file"
             )
+
+
+def _few(names: Sequence[str]) -> str:
+    """The first names, and how many more there are."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(map(repr, names[:NAMED])) + more

@@ -347,10 +347,13 @@ def joined_spans(
 def why_nothing_aligned(
     name: str, spans: Mapping[str, tuple[float, float]], rejected: Mapping[str, Mapping[str, int]]
 ) -> str:
-    """One line: the time spans of the topics where they do not overlap, else the most frequent reasons of rejection.
+    """One line: topics of a single time, or spans that do not overlap, else the most frequent reasons of rejection.
 
     ``name`` is the flight's, ``spans`` as of ``stamp_spans``.
     """
+    single = [topic for topic, (start, stop) in spans.items() if start == stop]
+    if single:
+        return f"{name}: all of {', '.join(single)} is of a single time; at least two messages of each topic are needed"
     if max(start for start, _ in spans.values()) > min(stop for _, stop in spans.values()):
         intervals = ", ".join(f"{topic} {start:.3f} to {stop:.3f} s" for topic, (start, stop) in spans.items())
         return f"{name}: the header stamps do not overlap: {intervals}; stamp all topics with one clock"

@@ -73,6 +73,7 @@ def test_inertia_may_be_left_out():
 
 
 # what to replace, by what, and what the one line must hold
+MANY_CONTROLS = "controls:\n" + "".join(f"  flap{i}: {{joint: flap{i}, symbol: f{i}}}\n" for i in range(2000))
 MISTAKES = [
     ("mass: 3.0", "mass: -3.0", ("f.yaml:3: mass: got -3.0, expected a positive number (kg, 1e-9 to 1e9)",)),
     ("mass: 3.0", 'mass: "3.0"', ("mass: got the text '3.0'",)),
@@ -108,6 +109,7 @@ MISTAKES = [
     ("{joint: rudder, scale: -1.0}", "{joint: throttle}", ("controls.rudder: joint 'throttle' is already",)),
     (", symbol: df", "", ("controls.flap: not one of elevator, aileron, rudder, throttle", "needs a symbol")),
     ("  rudder: ", "  ruder: ", ("controls.ruder: not one of", "did you mean 'rudder'?")),
+    ("controls:\n", MANY_CONTROLS, ("f.yaml:", "controls: 2004 controls, expected at most 32")),
     ("symbol: df", "symbol: alpha", ("controls.flap.symbol: got 'alpha'",)),
     ("symbol: df", "symbol: da", ("controls.flap: symbol 'da' is already that of 'aileron'",)),
     ("limit: 0.35", "symbol: dx", ("controls.elevator.symbol: got 'dx'", "'de'")),

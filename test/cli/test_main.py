@@ -87,7 +87,8 @@ def test_done_is_zero():
     ("arguments", "line"),
     [
         (["convert"], "sysid convert: the following arguments are required: LOG, --out; see sysid convert --help"),
-        ([*CONVERT, "--fast"], "sysid: unrecognized arguments: --fast; see sysid --help"),
+        ([*CONVERT, "--fast"], "sysid convert: unrecognized arguments: --fast; see sysid convert --help"),
+        (["--fast", *CONVERT], "sysid: unrecognized arguments: --fast; see sysid --help"),
         ([*CONVERT, "--storage", "x"], "sysid convert: argument --storage: invalid choice: 'x'"),
         (["land"], "sysid: argument COMMAND: invalid choice: 'land'"),
     ],

@@ -65,3 +65,10 @@ def test_unknown_joints_are_named_with_those_present():
         MAP.require(("elevator", "servo_3", "rudder"), "bag x")
     with pytest.raises(InputError, match="they have none"):
         MAP.require((), "bag x")
+
+
+def test_of_very_many_joints_the_first_are_named():
+    many = [f"servo_{i}" for i in range(3000)]
+    with pytest.raises(InputError, match=r"'servo_11' and 2988 more; name them so") as caught:
+        MAP.require(many, "bag x")
+    assert len(str(caught.value)) < 400

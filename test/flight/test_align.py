@@ -141,6 +141,14 @@ def test_topics_that_do_not_overlap_are_said_so():
         flight_record(AIRCRAFT, dataclasses.replace(streams, air_data=later), 0.2)
 
 
+def test_a_single_message_is_not_called_an_overlap_that_is_missing():
+    streams = made_streams(1.0)
+    alone = with_stamps(streams.air_data, np.full_like(streams.air_data.arrival.stamp_ns, 100_000_000_000))
+    with pytest.raises(InputError, match="all of air_data is of a single time; at least two messages") as caught:
+        flight_record(AIRCRAFT, dataclasses.replace(streams, air_data=alone), 0.2)
+    assert "overlap" not in str(caught.value)
+
+
 def test_the_commonest_reasons_are_said_where_nothing_is_left():
     streams = made_streams(1.0)
     degrees = dataclasses.replace(streams.actuators, positions=np.full_like(streams.actuators.positions, 5.0))

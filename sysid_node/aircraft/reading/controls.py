@@ -14,11 +14,16 @@ from sysid_node.aircraft.names import CONTROL_SYMBOLS, RESERVED_SYMBOLS
 from sysid_node.aircraft.reading.quantities import Quantities, ReadNumber, angle, any_number
 from sysid_node.suggestion import did_you_mean
 
+#: The largest number of controls: twice the outputs of an autopilot. What is made of all pairs of them stays small.
+MOST_CONTROLS = 32
+
 
 def read_controls(entry: DocumentEntry, quantities: Quantities) -> tuple[dict[str, Control], Throttle | None]:
     """The controls by name, and the throttle. Raises InputError."""
     entries = entry.mapping("a mapping from control to its joints, e.g. elevator: {joint: elevator}")
     throttle = _throttle(entries.pop("throttle"), quantities) if "throttle" in entries else None
+    if len(entries) > MOST_CONTROLS:
+        raise entry.error(f"{len(entries)} controls, expected at most {MOST_CONTROLS}")
     controls = {name: _control(name, item, quantities) for name, item in entries.items()}
     _check_symbols(entries, controls)
     _check_joints(entries, controls, throttle)
