@@ -14,7 +14,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.control import controller
 from sysid_node.control.inputs.estimates import identified_derivatives
 from sysid_node.control.settings import ControllerSettings as Control
-from sysid_node.control.types import Measurements, SetPoints
+from sysid_node.control.types import ErrorCorrelation, Measurements, SetPoints
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.excite import exciter
 from sysid_node.excite.exciter_settings import ExcitationSettings
@@ -133,6 +133,9 @@ def _estimate(
     V, alpha, beta = now.outputs[9:].tolist()
     session.air_data(stamp, (V, alpha, beta, now.density))
     for due in session.imu(stamp, tuple(now.outputs[:6].tolist())):
+        covariance = session.renewed_covariance()
+        if covariance is not None:
+            controller.receive_correlation(pilot, ErrorCorrelation(*covariance.correlation()))
         controller.receive_estimates(pilot, now.time, identified_derivatives(due.estimates))
         precision = relative_precision(due.estimates.derivatives.values(), session.aircraft)
         if exciter.receive_estimates(excitation, now.time, precision):

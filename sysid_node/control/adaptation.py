@@ -1,32 +1,32 @@
 """Adapts the gains of an axis to new estimates, within gain and phase margins and at a bounded rate.
 
 An estimate is used where it is valid, its interval is narrow and R^2 of its equation is large; the other derivatives
-keep their values. The new gains are flown only if the loop is stable with margins at every corner of the used
-intervals. Otherwise gains of a regulator with a larger weight on the surfaces are tried, and else the old gains are
-kept. A few corners are checked at each step, so that no command is delayed. Gains and derivatives then move to the new
-values on a straight line at a bounded rate.
+keep their values. The new gains are flown only if the loop is stable with margins at every point of the used
+estimates' confidence region (``confidence_region``). Otherwise gains of a regulator with a larger weight on the
+surfaces are tried, and else the old gains are kept. A few points are checked at each step, so that no command is
+delayed. Gains and derivatives then move to the new values on a straight line at a bounded rate.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.control.design.axis import ControlAxis
+from sysid_node.control.design.confidence_region import region_points
 from sysid_node.control.design.margins import margins
 from sysid_node.control.settings import ControllerSettings
-from sysid_node.control.types import IdentifiedDerivative
+from sysid_node.control.types import ErrorCorrelation, IdentifiedDerivative
 
 Array = NDArray[np.float64]
 
-#: The number of derivatives whose intervals have corners (those with the largest effect), and corners checked a step.
-CORNERED, A_STEP = 8, 16
+#: Points of the confidence region that are checked in a step.
+A_STEP = 16
 
 #: Weights on the surfaces that are tried in turn, relative to the baseline's.
 CAUTIONS = (1.0, 2.0, 4.0, 8.0, 16.0)
@@ -53,10 +53,10 @@ class AxisParameters(NamedTuple):
 
 @dataclass
 class MarginCheck:
-    """Gains whose margins are being checked at the corners (N, D) of the intervals, ``passed`` of which are done."""
+    """Gains whose margins are being checked at N points of the confidence region, ``passed`` of which are done."""
 
     values: Array  # (D,)
-    corners: Array
+    points: Array  # (N, D)
     gains: Array
     passed: int = 0
     caution: int = 0  # place in ``CAUTIONS``
@@ -113,9 +113,16 @@ def forget(state: AxisAdaptation) -> None:
 
 
 def consider(
-    state: AxisAdaptation, estimates: Mapping[str, IdentifiedDerivative], settings: ControllerSettings, now: float
+    state: AxisAdaptation,
+    estimates: Mapping[str, IdentifiedDerivative],
+    settings: ControllerSettings,
+    now: float,
+    correlation: ErrorCorrelation | None = None,
 ) -> None:
-    """Begin to check gains for new estimates, if no check is under way and the last one is long enough ago."""
+    """Begin to check gains for new estimates, if no check is under way and the last one is long enough ago.
+
+    Without the ``correlation`` of the estimates' errors, all corners of their intervals are checked.
+    """
     if state.check is not None or abs(now - state.checked_at) < PERIOD:
         return
     values, half, used = state.target.values.copy(), np.zeros(len(state.axis.derivatives)), []
@@ -133,14 +140,15 @@ def consider(
     if not _same_sense(state.axis, gains):
         state.verdict = "kept: a steady deflection would do the opposite"
         return
-    state.check, state.checked_at = MarginCheck(values, interval_corners(state.axis, values, half), gains), now
+    region = region_points(values, half, state.axis.signals, _among(state.axis, used, correlation))
+    state.check, state.checked_at = MarginCheck(values, region, gains), now
     state.used = tuple(used)
 
 
 def advance(state: AxisAdaptation, settings: ControllerSettings, step: float) -> None:
-    """Check some corners, and move the parameters towards the target for ``step`` (s): fast where it is a fall-back."""
+    """Check some points, and move the parameters towards the target for ``step`` (s): fast where it is a fall-back."""
     if state.check is not None:
-        _check_corners(state, state.check, settings)
+        _check_points(state, state.check, settings)
     rate = settings.gain_rate if state.left is None else max(settings.gain_rate, state.fall_rate)
     state.flown = _moved(state.axis, state.flown, state.target, rate * step)
 
@@ -156,41 +164,42 @@ def _usable(estimate: IdentifiedDerivative, half: float, explained: float) -> bo
     return estimate.valid and tight and estimate.r_squared >= explained
 
 
-def interval_corners(axis: ControlAxis, values: Array, half: Array) -> Array:
-    """(N, D) the corners of the intervals with the largest effect, with all other derivatives at their values."""
-    widest = np.argsort(-half * axis.signals)[:CORNERED]
-    chosen = widest[half[widest] > 0.0]
-    signs = np.array(list(product((-1.0, 1.0), repeat=chosen.size)))
-    corners = np.tile(values, (len(signs), 1))
-    corners[:, chosen] += signs * half[chosen]
-    return np.vstack([values, corners])
+def _among(axis: ControlAxis, used: Sequence[str], correlation: ErrorCorrelation | None) -> Array | None:
+    """(D, D) correlation of the errors of the axis's derivatives, of which those not ``used`` have none; or None."""
+    known = None if correlation is None else correlation.of(used)
+    if known is None:
+        return None
+    places = [axis.derivatives.index(name) for name in used]
+    found = np.eye(len(axis.derivatives))
+    found[np.ix_(places, places)] = known
+    return found
 
 
-def _check_corners(state: AxisAdaptation, check: MarginCheck, settings: ControllerSettings) -> None:
-    """Check the next few corners."""
-    corners = check.corners[check.passed : check.passed + A_STEP]
-    if not _have_margins(state.axis, corners, check.gains, settings):
+def _check_points(state: AxisAdaptation, check: MarginCheck, settings: ControllerSettings) -> None:
+    """Check the next few points."""
+    points = check.points[check.passed : check.passed + A_STEP]
+    if not _have_margins(state.axis, points, check.gains, settings):
         _raise_caution(state, check)
         return
-    check.passed += len(corners)
-    if check.passed == len(check.corners):
+    check.passed += len(points)
+    if check.passed == len(check.points):
         state.target, state.check = AxisParameters(check.values, check.gains), None
         state.accepted += 1
         caution = CAUTIONS[check.caution]
         state.verdict = "adapted" if caution == 1.0 else f"adapted, caution {caution:g}"
 
 
-def _have_margins(axis: ControlAxis, corners: Array, gains: Array, settings: ControllerSettings) -> bool:
+def _have_margins(axis: ControlAxis, points: Array, gains: Array, settings: ControllerSettings) -> bool:
     if not np.isfinite(gains).all():
         return False
-    found = margins(axis.model(corners), gains, axis.delay)
+    found = margins(axis.model(points), gains, axis.delay)
     return bool(found.enough(settings.gain_margin, settings.phase_margin).all())
 
 
 def _raise_caution(state: AxisAdaptation, check: MarginCheck) -> None:
     check.caution, check.passed = check.caution + 1, 0
     if check.caution == len(CAUTIONS):
-        state.check, state.refused, state.verdict = None, state.refused + 1, "kept: no margins at the corners"
+        state.check, state.refused, state.verdict = None, state.refused + 1, "kept: no margins within the intervals"
         return
     check.gains = _gains(state.axis, check.values, CAUTIONS[check.caution])
 

@@ -1,6 +1,7 @@
 """The adaptive controller: ``init``, ``receive_estimates`` for new estimates, ``step`` for every command.
 
     state = init(aircraft, settings)
+    receive_correlation(state, correlation)               # of the estimates' errors, where it is known
     receive_estimates(state, time, estimates)             # {"Cm_de": IdentifiedDerivative(...), ...}
     command = step(state, measured, set_points)           # rad, N
 
@@ -24,7 +25,7 @@ from sysid_node.control.law import control_law
 from sysid_node.control.law.control_law import LONGEST_STEP, LawState
 from sysid_node.control.law.tracking import TrackingWatch
 from sysid_node.control.settings import ControllerSettings
-from sysid_node.control.types import Command, IdentifiedDerivative, Measurements, SetPoints
+from sysid_node.control.types import Command, ErrorCorrelation, IdentifiedDerivative, Measurements, SetPoints
 
 NO_EXCITATION = (0.0, 0.0, 0.0)
 FIRST_STEP = 0.005  # s
@@ -42,6 +43,7 @@ class ControllerState:
     tracking: TrackingWatch
     time: float = math.nan  # s, of the last step
     estimates_time: float = -math.inf  # s, of the last estimates
+    correlation: ErrorCorrelation | None = None  # of the estimates' errors
     stale: str = "no estimates yet"  # the reason why the baseline is flown; empty where estimates are used
 
 
@@ -56,12 +58,17 @@ def init(aircraft: Aircraft, settings: ControllerSettings) -> ControllerState:
     return ControllerState(settings, (pitch, lateral), flown, checks, TrackingWatch(settings.largest_tracking_error))
 
 
+def receive_correlation(state: ControllerState, correlation: ErrorCorrelation) -> None:
+    """Take a new correlation of the estimates' errors; one that cannot be meant leaves them with none."""
+    state.correlation = state.checks.correlation(correlation)
+
+
 def receive_estimates(state: ControllerState, time: float, estimates: Mapping[str, IdentifiedDerivative]) -> None:
     """Take new estimates at a time (s, by the sensors' clock)."""
     state.estimates_time, estimates = time, state.checks.estimates(estimates)
     if state.settings.adapt and not state.stale:
         for axis in state.axes:
-            adaptation.consider(axis, estimates, state.settings, time)
+            adaptation.consider(axis, estimates, state.settings, time, state.correlation)
 
 
 def step(

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 
 class Measurements(NamedTuple):
@@ -42,6 +48,20 @@ class IdentifiedDerivative(NamedTuple):
     upper: float
     valid: bool
     r_squared: float  # 0..1, share of the coefficient's variance that the model explains
+
+
+class ErrorCorrelation(NamedTuple):
+    """The correlation of the errors of D identified derivatives."""
+
+    names: tuple[str, ...]
+    matrix: Array  # (D, D)
+
+    def of(self, names: Sequence[str]) -> Array | None:
+        """(n, n) that of n derivatives; None where it lacks one of them."""
+        if not set(names) <= set(self.names):
+            return None
+        places = [self.names.index(name) for name in names]
+        return np.asarray(self.matrix[np.ix_(places, places)])
 
 
 class Command(NamedTuple):

@@ -2,7 +2,7 @@
 
 Stevens, Lewis & Johnson (2016), "Aircraft Control and Simulation", sec. 3.7 and 4.1: short period and
 lateral-directional motion at constant airspeed, without the thrust's part. A derivative may be an array (N,): N
-aircraft at once, such as the corners of an estimate's intervals.
+aircraft at once, such as the points of a confidence region.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from sysid_node.flight.align import counts_by_reason
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.online import estimator
 from sysid_node.online.alignment import schedule, streaming
+from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_covariance
 from sysid_node.online.estimates.current_solution import CurrentSolution, current_solution
 from sysid_node.online.estimates.model_gap import CoefficientGap, model_gap
 from sysid_node.online.estimates.published import estimate_of
@@ -47,6 +48,7 @@ class Session:
         self.intake = streaming.init(self.aircraft, self.settings.max_gap, self.settings.actuators)
         self.schedule = schedule.Schedule(self.publish_rate)
         self.samples = 0
+        self._correlated: object = None  # the slowly changing quantities whose covariance was asked for last
         self._heard = time.monotonic()
         self._published = -math.inf  # s, time.perf_counter when estimates last fell due
         self._free = (1.0 - BUSY) / self.publish_rate  # s after that in which there is time
@@ -68,6 +70,16 @@ class Session:
         current = current_solution(self.state)
         estimates = estimate_of(self.state, current, last + silence)
         return Due(streaming.stamp_of(self.intake, last), estimates, current)
+
+    def renewed_covariance(self) -> EstimateCovariance | None:
+        """The covariance of the estimates; None where no renewal has changed its correlations since it was asked for.
+
+        Between renewals variances shrink together, so that correlations stay.
+        """
+        if self.state.latest is self._correlated:
+            return None
+        self._correlated = self.state.latest
+        return estimate_covariance(self.state)
 
     def gap(self, due: Due) -> Sequence[CoefficientGap]:
         """How far the flight is from the aircraft file where estimates fell due, before anything else comes."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import Imu, JointState
-from sysid_msgs.msg import AirData, DerivativeEstimates
+from sysid_msgs.msg import AirData, DerivativeEstimates, EstimateCorrelation
 
 from sysid_node.control import controller
 from sysid_node.control.design.plant import CONTROLS
@@ -33,9 +33,11 @@ from sysid_node.ros.support.conversion import NANOSECONDS, stamp_ns
 from sysid_node.ros.support.loop_node import (
     AIRCRAFT,
     COMMAND,
+    CORRELATION,
     DERIVATIVES,
     EXCITATION,
     LAG,
+    LAST_QOS,
     LATEST,
     SET_POINT_QOS,
     SET_POINTS,
@@ -62,10 +64,15 @@ PARAMETERS = (
     _setting(
         "gain_margin",
         "",
-        "Factor by which every loop's gain may grow or fall, over the corners of the intervals (2 = 6 dB).",
+        "Factor by which every loop's gain may grow or fall, whatever is true within the intervals (2 = 6 dB).",
         "Up for more caution.",
     ),
-    _setting("phase_margin", "rad", "Phase that every loop has left, over the corners.", "Up for more caution."),
+    _setting(
+        "phase_margin",
+        "rad",
+        "Phase that every loop has left, whatever is true within the intervals.",
+        "Up for more caution.",
+    ),
     _setting(
         "tightness",
         "",
@@ -134,6 +141,7 @@ class AdaptiveController(LoopNode):
         self.listen(Imu, IMU, ATTITUDE_PATHS, self._on_imu, LATEST)
         self.listen(AirData, AIR_DATA, PATHS[AIR_DATA], self._on_air_data, LATEST)
         self.hear(DerivativeEstimates, DERIVATIVES, self._on_estimates, 10, needed=self.values["adapt"])
+        self.hear(EstimateCorrelation, CORRELATION, self._on_correlation, LAST_QOS, needed=False)
         self.listen(JointState, EXCITATION, PATHS[ACTUATORS], self._on_excitation, LATEST, needed=False)
         self.listen(JointState, SET_POINTS, PATHS[ACTUATORS], self._on_set_points, SET_POINT_QOS, needed=False)
         self._imu = Arrivals(self.inputs[IMU].name, IMU_AGE)
@@ -209,6 +217,11 @@ class AdaptiveController(LoopNode):
         estimates = conversion.estimates_from_message(message, self._start_ns)
         self._others[DERIVATIVES].arrived(stamp_ns(message.header.stamp) / NANOSECONDS)
         controller.receive_estimates(self._state, estimates.time, identified_derivatives(estimates))
+
+    def _on_correlation(self, message: Any) -> None:
+        if message.aircraft == self.aircraft.name:
+            correlation = conversion.correlation_from_message(message, self.aircraft.derivatives)
+            controller.receive_correlation(self._state, correlation)
 
     def _on_excitation(self, numbers: Numbers, texts: Texts) -> None:
         stamp, values = by_name(numbers, texts)

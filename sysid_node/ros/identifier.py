@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
-from sysid_msgs.msg import AirData, DerivativeEstimates, ModelGap
+from sysid_msgs.msg import AirData, DerivativeEstimates, EstimateCorrelation, ModelGap
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
@@ -39,7 +39,7 @@ from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, refusal, values_of
 from sysid_node.ros.support.diagnostics import DiagnosticSource, lag_level, lag_words, rejections
 from sysid_node.ros.support.lifecycle import CarefulNode
-from sysid_node.ros.support.loop_node import SENSOR_QOS, UNHEARD, expected_joints, full_name, say
+from sysid_node.ros.support.loop_node import LAST_QOS, SENSOR_QOS, UNHEARD, expected_joints, full_name, say
 from sysid_node.ros.support.message_types import fields_of
 from sysid_node.ros.support.spin import run_node, while_ros_is_up
 
@@ -89,6 +89,7 @@ class Identifier(CarefulNode):
         self._publish_times = Durations()
         self._derivatives = self.create_lifecycle_publisher(DerivativeEstimates, "~/derivatives", 10)
         self._model_gap = self.create_lifecycle_publisher(ModelGap, "~/model_gap", 10)
+        self._correlation = self.create_lifecycle_publisher(EstimateCorrelation, "~/correlation", LAST_QOS)
         self._monitors = {topic: TopicMonitor(topic) for topic in (IMU, AIR_DATA, ACTUATORS)}
         self._recent, self._conditions = RecentCounts(), Conditions()
         self._joints: Text = ()  # the names of the last message about actuators
@@ -107,7 +108,7 @@ class Identifier(CarefulNode):
         self._session = None
         for subscription in self._inputs:
             self.destroy_subscription(subscription)
-        for publisher in (self._derivatives, self._model_gap):
+        for publisher in (self._derivatives, self._model_gap, self._correlation):
             self.destroy_lifecycle_publisher(publisher)
 
     # Messages
@@ -158,6 +159,9 @@ class Identifier(CarefulNode):
         header = conversion.header(due.stamp_ns, self._frame_id)
         gaps, servos = session.gap(due), session.servo_gaps(due)
         self._model_gap.publish(conversion.gap_message(gaps, servos, header, session.aircraft.name))
+        covariance = session.renewed_covariance()
+        if covariance is not None:
+            self._correlation.publish(conversion.correlation_message(covariance, header, session.aircraft.name))
         self._publish_times.add(time.perf_counter() - start)
         # Diagnostics follow an estimate at once, as no other estimate can be waiting then.
         if time.monotonic() - self._reported >= DIAGNOSTICS:

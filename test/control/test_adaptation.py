@@ -1,4 +1,4 @@
-"""Gates, checks over the corners, bounded movement, fall-back: what is flown, and when."""
+"""Gates, checks over the confidence region, bounded movement, fall-back: what is flown, and when."""
 
 import math
 
@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from flying import AIRCRAFT, NAN, STEP, beliefs, level
 
-from sysid_node.control import adaptation, controller
+from sysid_node.control import controller
 from sysid_node.control.design.axis import axes
+from sysid_node.control.design.confidence_region import region_points
 from sysid_node.control.design.margins import margins
 from sysid_node.control.settings import ControllerSettings
-from sysid_node.control.types import SetPoints
+from sysid_node.control.types import ErrorCorrelation, IdentifiedDerivative, SetPoints
 from sysid_node.errors import InputError
 
 ELEVATOR = {"Cm_de": 0.4, "CL_de": 0.4}
@@ -81,7 +82,7 @@ def test_what_is_flown_has_margins_at_every_corner(state: controller.ControllerS
         assert axis.accepted > 0
         values = np.array([estimates[name].value for name in axis.axis.derivatives])
         half = np.array([0.5 * (estimates[n].upper - estimates[n].lower) for n in axis.axis.derivatives])
-        corners = adaptation.interval_corners(axis.axis, values, half)
+        corners = region_points(values, half, axis.axis.signals, None)
         found = margins(axis.axis.model(corners), axis.target.gains, axis.axis.delay)
         assert found.enough(2.0, math.pi / 4.0).all()
 
@@ -89,6 +90,61 @@ def test_what_is_flown_has_margins_at_every_corner(state: controller.ControllerS
 def test_wide_corners_ask_for_caution(state: controller.ControllerState) -> None:
     flown(state, 5.0, beliefs(half=0.35))
     assert "caution" in state.axes[0].verdict or "kept" in state.axes[0].verdict
+
+
+#: What was identified of a cdrw with its centre of gravity aft, in flight: value, half of the 95 % interval.
+UNSTABLE = {
+    "CL_alpha": (2.556, 0.619),
+    "CL_de": (0.941, 0.282),
+    "Cm_alpha": (0.075, 0.053),
+    "Cm_q": (-0.484, 0.188),
+    "Cm_de": (-0.336, 0.059),
+}
+#: The correlation of these errors.
+TOGETHER = np.array(
+    [
+        [1.0, -0.33, 0.21, -0.27, -0.29],
+        [-0.33, 1.0, -0.02, -0.13, -0.37],
+        [0.21, -0.02, 1.0, 0.04, -0.10],
+        [-0.27, -0.13, 0.04, 1.0, 0.60],
+        [-0.29, -0.37, -0.10, 0.60, 1.0],
+    ]
+)
+
+
+def unstable() -> dict[str, IdentifiedDerivative]:
+    return {name: IdentifiedDerivative(v, v - h, v + h, True, 1.0) for name, (v, h) in UNSTABLE.items()}
+
+
+def test_an_unstable_aircraft_is_adapted_to_where_it_is_known_how_errors_go_together() -> None:
+    """The corners of five separate intervals are 4.4 standard errors away, where nothing can be flown with margins."""
+    separate, joint = (controller.init(AIRCRAFT, ControllerSettings()) for _ in range(2))
+    controller.receive_correlation(joint, ErrorCorrelation(tuple(UNSTABLE), TOGETHER))
+    for state in (separate, joint):
+        flown(state, 8.0, unstable())
+    assert separate.axes[0].verdict == "kept: no margins within the intervals"
+    assert joint.axes[0].verdict == "adapted, caution 4"
+
+
+def test_between_the_points_of_the_region_margins_are_kept_too() -> None:
+    """2000 errors drawn from their distribution: with 95 % they are within the region, where 2 and 45 deg are kept."""
+    state = controller.init(AIRCRAFT, ControllerSettings())
+    controller.receive_correlation(state, ErrorCorrelation(tuple(UNSTABLE), TOGETHER))
+    flown(state, 8.0, unstable())
+    axis, errors = state.axes[0].axis, np.array([half for _, half in UNSTABLE.values()]) / 1.96
+    drawn = np.random.default_rng(1).multivariate_normal(np.zeros(5), TOGETHER * np.outer(errors, errors), 2000)
+    values = np.tile(state.axes[0].target.values, (2000, 1))
+    values[:, [axis.derivatives.index(name) for name in UNSTABLE]] += drawn
+    found = margins(axis.model(values), state.axes[0].target.gains, axis.delay)
+    assert found.enough(2.0, math.pi / 4.0).mean() > 0.95
+    assert found.stable.all()
+
+
+def test_what_is_known_of_some_errors_only_leaves_the_intervals() -> None:
+    state = controller.init(AIRCRAFT, ControllerSettings())
+    controller.receive_correlation(state, ErrorCorrelation(tuple(UNSTABLE)[1:], TOGETHER[1:, 1:]))
+    flown(state, 8.0, unstable())
+    assert state.axes[0].verdict == "kept: no margins within the intervals"
 
 
 @pytest.mark.parametrize("share", [0.05, 0.0, -0.5])

@@ -25,15 +25,16 @@ from hypothesis import strategies as st
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
-from sysid_msgs.msg import AirData, DerivativeEstimate, DerivativeEstimates, FitQuality
+from sysid_msgs.msg import AirData, DerivativeEstimate, DerivativeEstimates, EstimateCorrelation, FitQuality
 
 ROOT = Path(__file__).resolve().parents[2]
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+KEPT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ANY = st.floats(allow_nan=True, allow_infinity=True)
 CONTROLLER = "uav1/adaptive_controller: state"
 SURFACES = ("elevator", "aileron", "rudder")
@@ -61,6 +62,7 @@ class Client:
         self.excitation = make(JointState, "/uav1/actuators/excitation", 10)
         self.points = make(JointState, "/uav1/set_points", BEST_EFFORT)
         self.estimates = make(DerivativeEstimates, "/uav1/identifier/derivatives", 10)
+        self.correlation = make(EstimateCorrelation, "/uav1/identifier/correlation", KEPT)
         self.others_estimates = make(DerivativeEstimates, "/uav3/identifier/derivatives", 10)
         self.excitation_of_others: list[tuple[int, list[float]]] = []  # stamps in ns, rad
         self.command = make(JointState, "/uav2/actuators/command", 10)
@@ -245,6 +247,9 @@ def test_whatever_is_sent_commands_stay_within_the_limits(
             publisher.publish(serialize_message(message)[:-cut])
     client.faults.publish(fault(text, text))
     estimate = DerivativeEstimate(name="Cm_de", value=values[7], lower=values[8], upper=values[0], valid=True)
+    names = ["Cm_de", text, "Cm_q"]
+    client.correlation.publish(EstimateCorrelation(aircraft="cdrw", names=names, correlation=list(values)))
+    client.correlation.publish(EstimateCorrelation(aircraft="cdrw", names=names[:cut], correlation=list(values[:cut])))
     client.estimates.publish(DerivativeEstimates(header=stamped, aircraft="cdrw", derivatives=[estimate]))
     client.estimates.publish(DerivativeEstimates(header=stamped, aircraft=text, derivatives=[estimate]))
     client.commands.clear()
@@ -341,6 +346,14 @@ def test_another_aircrafts_estimates_are_left_out(client: Client) -> None:
     def said() -> bool:
         client.estimates.publish(DerivativeEstimates(header=client.header(), aircraft="kestrel"))
         return "of aircraft 'kestrel', left out" in client.said(CONTROLLER)
+
+    client.until(said)
+
+
+def test_what_is_no_correlation_is_said(client: Client) -> None:
+    def said() -> bool:
+        client.correlation.publish(EstimateCorrelation(aircraft="cdrw", names=["Cm_de", "Cm_q"], correlation=[1.0]))
+        return "correlation implausible, dropped" in client.said(CONTROLLER)
 
     client.until(said)
 

@@ -1,6 +1,7 @@
 """The live node, in a process of its own, over DDS."""
 
 import json
+import math
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -11,9 +12,10 @@ from harness import ROOT, START_NS, Probe, identifier, made_up_streams, start_id
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
 from rcl_interfaces.srv import DescribeParameters, SetParameters
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
-from sysid_msgs.msg import AirData
+from sysid_msgs.msg import AirData, EstimateCorrelation
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag.reader import read_streams
@@ -171,6 +173,27 @@ def test_bad_messages_are_counted_and_survived(probe: Probe) -> None:
         probe.until(lambda: float(probe.said("estimate", "flight time (s)")) > 3.5)
         assert probe.said("state", "exceptions in callbacks") == "0"
         assert process.poll() is None
+
+
+def test_who_subscribes_late_hears_how_errors_go_together(probe: Probe) -> None:
+    """Renewals send it every half second or less often; the last one is kept."""
+    kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    heard: list[EstimateCorrelation] = []
+    with identifier():
+        probe.await_identifier()
+        probe.speak(made_up_streams(3.0))
+        probe.until(lambda: probe.estimates and math.isfinite(probe.estimates[-1].derivatives[0].value))
+        probe.spin(0.5)
+        late = probe.node.create_subscription(EstimateCorrelation, "/identifier/correlation", heard.append, kept)
+        probe.until(lambda: heard)
+        probe.node.destroy_subscription(late)
+    message = heard[0]
+    assert message.aircraft == "cdrw"
+    assert set(message.names) <= load_aircraft("cdrw").derivatives.keys()
+    matrix = np.array(message.correlation).reshape(len(message.names), -1)
+    np.testing.assert_allclose(matrix.diagonal(), 1.0)
+    np.testing.assert_allclose(matrix, matrix.T)
+    assert np.abs(matrix).max() <= 1.0
 
 
 def test_a_missing_topic_is_named(probe: Probe) -> None:

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from harness import START_NS, made_up_streams
 
@@ -68,6 +69,18 @@ def test_reset_forgets(session: Session) -> None:
     session.reset()
     assert (session.samples, session.rejected) == (0, {})
     assert repr(fly(session, made_up_streams(3.0), "iaj")) == repr(first)
+
+
+def test_the_covariance_is_new_once_with_every_renewal(session: Session) -> None:
+    assert session.renewed_covariance() is None, "nothing is known yet"
+    fly(session, made_up_streams(5.0), "iaj")
+    covariance = session.renewed_covariance()
+    assert covariance is not None
+    _, matrix = covariance.correlation()
+    np.testing.assert_allclose(matrix.diagonal(), 1.0)
+    assert session.renewed_covariance() is None
+    session.reset()
+    assert session.renewed_covariance() is None
 
 
 def test_silence_is_stale(session: Session) -> None:

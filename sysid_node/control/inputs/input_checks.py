@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.control.types import IdentifiedDerivative, Measurements
+from sysid_node.control.types import ErrorCorrelation, IdentifiedDerivative, Measurements
 from sysid_node.flight.checks import (
     AIRSPEED_HIGH,
     AIRSPEED_LOW,
@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 
 #: Largest derivative, per rad, that is taken for an estimate: far beyond that of any fixed-wing aircraft.
 LARGEST_DERIVATIVE = 1.0e3
+
+#: Least eigenvalue of a correlation matrix: that of a true one is zero but for rounding.
+LEAST_EIGENVALUE = -1.0e-4
 
 _ANGLE, _RATE = (-ANGLE_LIMIT, ANGLE_LIMIT), (-RATE_LIMIT, RATE_LIMIT)
 #: Plausible values of what is measured, SI.
@@ -76,7 +79,23 @@ class InputChecks:
                 usable[name] = estimate
         return usable
 
+    def correlation(self, correlation: ErrorCorrelation) -> ErrorCorrelation | None:
+        """The correlation of the estimates' errors; None where it is no correlation matrix of as many names."""
+        names, matrix = correlation
+        if len(set(names)) == len(names) and matrix.shape == (len(names),) * 2 and _is_correlation(matrix):
+            return correlation
+        self.counts["correlation implausible, dropped"] += 1
+        return None
+
 
 def _in_order(estimate: IdentifiedDerivative) -> bool:
     """Whether value and interval are finite, plausible, and in order."""
     return -LARGEST_DERIVATIVE <= estimate.lower <= estimate.value <= estimate.upper <= LARGEST_DERIVATIVE
+
+
+def _is_correlation(matrix: Array) -> bool:
+    """Whether a square matrix is symmetric with ones on its diagonal, and has no negative eigenvalue."""
+    if not (np.abs(matrix) <= 1.0 + 1e-6).all():  # NaN is not
+        return False
+    alike = np.allclose(matrix, matrix.T, atol=1e-6) and np.allclose(matrix.diagonal(), 1.0, atol=1e-6)
+    return alike and bool((np.linalg.eigvalsh(matrix) >= LEAST_EIGENVALUE).all())

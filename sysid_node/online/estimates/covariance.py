@@ -36,6 +36,15 @@ class EstimateCovariance:
         """(D, D) of all errors; the diagonal holds the squared standard errors."""
         return np.asarray(self.statistical + self.systematic)
 
+    def correlation(self) -> tuple[tuple[str, ...], Array]:
+        """The derivatives whose errors are finite, and the correlation of these errors."""
+        total = self.total
+        variances = total.diagonal()
+        known = np.flatnonzero(np.isfinite(variances) & (variances > 0.0))
+        deviations = np.sqrt(variances[known])
+        matrix = total[np.ix_(known, known)] / np.outer(deviations, deviations)
+        return tuple(self.names[i] for i in known.tolist()), np.clip(matrix, -1.0, 1.0)
+
 
 def estimate_covariance(state: EstimatorState) -> EstimateCovariance | None:
     """The covariance of the estimates with all samples so far; None before there are any.

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
+import numpy as np
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
-from sysid_msgs.msg import ModelGap
+from sysid_msgs.msg import EstimateCorrelation, ModelGap
 
+from sysid_node.control.types import ErrorCorrelation
 from sysid_node.online import types
+from sysid_node.online.estimates.covariance import EstimateCovariance
 from sysid_node.online.estimates.model_gap import CoefficientGap
 from sysid_node.online.estimates.servo_gap import ServoGap
 from sysid_node.online.types import Estimates
@@ -54,6 +57,25 @@ def gap_message(gaps: Sequence[CoefficientGap], servos: Sequence[ServoGap], head
         servo_time_error=[servo.standard_error for servo in servos],
         servo_time_in_file=[servo.in_file for servo in servos],
     )
+
+
+def correlation_message(covariance: EstimateCovariance, header: Header, aircraft: str) -> EstimateCorrelation:
+    """The message of how the errors of all derivatives go together."""
+    names, matrix = covariance.correlation()
+    return EstimateCorrelation(header=header, aircraft=aircraft, names=list(names), correlation=matrix.ravel())
+
+
+def correlation_from_message(message: Any, known: Collection[str]) -> ErrorCorrelation:
+    """The correlation in a sysid_msgs/EstimateCorrelation of the ``known`` derivatives among its names.
+
+    It is empty, with names, where the message does not hold a number for each pair of names.
+    """
+    places = {name: i for i, name in enumerate(message.names) if name in known}
+    numbers, count = np.asarray(message.correlation, np.float64), len(message.names)
+    if numbers.size != count * count:
+        return ErrorCorrelation(tuple(places), np.zeros((0, 0)))
+    chosen = list(places.values())
+    return ErrorCorrelation(tuple(places), numbers.reshape(count, count)[np.ix_(chosen, chosen)])
 
 
 def estimates_from_message(message: Any, start_ns: int) -> Estimates:

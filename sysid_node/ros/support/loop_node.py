@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from sysid_node.aircraft.load import load_aircraft
@@ -33,6 +33,7 @@ COMMAND = "actuators/command"
 EXCITATION = "actuators/excitation"
 SET_POINTS = "set_points"
 DERIVATIVES = "identifier/derivatives"
+CORRELATION = "identifier/correlation"
 
 #: A short queue: old messages are of no use to a controller.
 LATEST = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -42,6 +43,9 @@ SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 #: Best effort takes publishers of either reliability.
 SET_POINT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+#: The last message is kept for those who subscribe later.
+LAST_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 #: The parameter that all nodes of the loop have.
 AIRCRAFT = NodeParameter(

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from sysid_node.control import controller
 from sysid_node.control.settings import ControllerSettings
-from sysid_node.control.types import Measurements, SetPoints
+from sysid_node.control.types import ErrorCorrelation, Measurements, SetPoints
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.flying import live
 
@@ -83,3 +83,25 @@ def test_estimates_without_a_usable_interval_are_dropped(changes: dict[str, floa
         controller.step(state, level(k * STEP), SetPoints())
     assert [axis.accepted for axis in state.axes] == [0, 0]
     assert state.checks.counts["estimates implausible, dropped"] == 20 * len(AIRCRAFT.derivatives)
+
+
+@pytest.mark.parametrize(
+    ("names", "matrix"),
+    [
+        (("Cm_de", "Cm_q"), [[1.0, NAN], [NAN, 1.0]]),
+        (("Cm_de", "Cm_q"), [[1.0, 1.5], [1.5, 1.0]]),
+        (("Cm_de", "Cm_q"), [[1.0, 0.5], [-0.5, 1.0]]),
+        (("Cm_de", "Cm_q"), [[0.5, 0.0], [0.0, 1.0]]),
+        (("Cm_de", "Cm_q"), [[1.0]]),
+        (("Cm_de", "Cm_de"), [[1.0, 0.0], [0.0, 1.0]]),
+        (("Cm_de", "Cm_q", "Cm_alpha"), [[1.0, 0.9, 0.9], [0.9, 1.0, -0.9], [0.9, -0.9, 1.0]]),
+    ],
+    ids=["NaN", "beyond 1", "not symmetric", "diagonal", "size", "a name twice", "negative eigenvalue"],
+)
+def test_what_is_no_correlation_matrix_is_dropped(names: tuple[str, ...], matrix: list[list[float]]) -> None:
+    state = controller.init(AIRCRAFT, ControllerSettings())
+    controller.receive_correlation(state, ErrorCorrelation(("Cm_de", "Cm_q"), np.eye(2)))
+    assert state.correlation is not None
+    controller.receive_correlation(state, ErrorCorrelation(names, np.array(matrix)))
+    assert state.correlation is None
+    assert state.checks.counts == {"correlation implausible, dropped": 1}

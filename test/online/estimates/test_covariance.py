@@ -87,5 +87,17 @@ def test_correlations_are_those_of_many_flights() -> None:
     assert np.abs(of_covariance - np.eye(3)).max() > 0.3  # there is something to compare
 
 
+def test_its_correlation_is_numpys_of_draws_with_that_covariance() -> None:
+    """Without the derivatives whose errors have no end."""
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(3, 3))
+    total = np.full((4, 4), np.inf)
+    total[np.ix_([0, 2, 3], [0, 2, 3])] = root @ root.T
+    names, matrix = EstimateCovariance(("a", "endless", "b", "c"), total, np.zeros((4, 4))).correlation()
+    assert names == ("a", "b", "c")
+    drawn = np.corrcoef(root @ rng.normal(size=(3, 200_000)))
+    np.testing.assert_allclose(matrix, drawn, atol=0.01)
+
+
 def test_nothing_is_known_before_the_first_data() -> None:
     assert estimate_covariance(estimator.init(made_aircraft(), SETTINGS)) is None

@@ -2,11 +2,13 @@
 
 import math
 
+import numpy as np
 import pytest
 from harness import START_NS
-from rclpy.serialization import deserialize_message
-from sysid_msgs.msg import DerivativeEstimates
+from rclpy.serialization import deserialize_message, serialize_message
+from sysid_msgs.msg import DerivativeEstimates, EstimateCorrelation
 
+from sysid_node.online.estimates.covariance import EstimateCovariance
 from sysid_node.online.estimates.serialisation import EstimatesSerialiser
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.ros.support import conversion
@@ -34,3 +36,19 @@ def test_estimates_survive_to_the_last_bit() -> None:
     message = deserialize_message(raw, DerivativeEstimates)
     assert (message.header.frame_id, message.aircraft, message.method) == ("base_link", "cdrw", "sls_rft")
     assert conversion.estimates_from_message(message, START_NS) == estimates
+
+
+def test_correlations_survive_without_names_that_are_not_known() -> None:
+    matrix = np.array([[1.0, 0.5, -0.25], [0.5, 1.0, 0.125], [-0.25, 0.125, 1.0]])
+    covariance = EstimateCovariance(("Cm_de", "foreign", "Cm_q"), 4.0 * matrix, np.zeros((3, 3)))
+    raw = serialize_message(conversion.correlation_message(covariance, conversion.header(START_NS, "imu"), "cdrw"))
+    message = deserialize_message(raw, EstimateCorrelation)
+    assert (message.aircraft, message.header.frame_id, len(message.correlation)) == ("cdrw", "imu", 9)
+    found = conversion.correlation_from_message(message, {"Cm_q", "Cm_de"})
+    assert found.names == ("Cm_de", "Cm_q")
+    np.testing.assert_array_equal(found.matrix, [[1.0, -0.25], [-0.25, 1.0]])
+
+
+def test_a_message_without_a_number_for_each_pair_of_names_holds_no_correlation() -> None:
+    message = EstimateCorrelation(names=["Cm_de", "Cm_q"], correlation=[1.0, 0.5, 1.0])
+    assert conversion.correlation_from_message(message, {"Cm_q", "Cm_de"}).matrix.size == 0
