@@ -1,7 +1,7 @@
 """Starts the identifier beside any autopilot: `ros2 launch sysid_node identify.launch.py aircraft:=cdrw`.
 
 Where the autopilot's topics have other names: `imu:=/mavros/imu/data actuators:=/servo_states`. Where they have other
-types, the adapter is started, too: `autopilot:=px4 joints:="elevator=1:0:0.35 ..." namespace:=sysid`.
+types, the adapter is started, too: `autopilot:=px4 joints:="elevator=servo2:0:0.44 ..." namespace:=sysid`.
 When one of the nodes ends, all of them do.
 """
 

@@ -112,3 +112,57 @@ def test_values_have_the_types_of_the_nodes_tables(actions: list[Kept]) -> None:
             for name, value in block.items():
                 kind = value.given["value_type"] if isinstance(value, Kept) else type(value)
                 assert kind is type(defaults[name]), (node.given["executable"], name)
+
+
+ARGUMENTS = {
+    "identify.launch.py": {
+        *("aircraft", "parameters", "namespace", "use_sim_time", "autopilot", "joints"),
+        *("imu", "air_data", "actuators"),
+    },
+    "closed_loop.launch.py": {
+        *("aircraft", "namespace", "turbulence", "speed", "effects", "adapt", "method", "bag"),
+    },
+}
+
+
+def test_arguments_are_those_of_the_documentation(request: pytest.FixtureRequest, actions: list[Kept]) -> None:
+    name = request.node.callspec.params["actions"].name
+    assert {one.words[0] for one in actions if one.kind == "DeclareLaunchArgument"} == ARGUMENTS[name]
+
+
+def value(expression: Kept, given: dict[str, str]) -> Any:
+    """A PythonExpression's value, as `launch` makes it: its parts put together, evaluated."""
+    text = "".join(part if isinstance(part, str) else given[part.words[0]] for part in expression.words[0])
+    return eval(text, {"float": float})
+
+
+@pytest.mark.parametrize("actions", [ROOT / "launch" / "closed_loop.launch.py"], indirect=True)
+@pytest.mark.parametrize(("speed", "simulated"), [("1.0", False), ("1", False), ("4.0", True), ("0.5", True)])
+def test_at_another_speed_the_nodes_take_the_simulators_clock(actions: list[Kept], speed: str, simulated: bool) -> None:
+    nodes = [one for one in actions if one.kind in ("Node", "LifecycleNode")]
+    own = {node.given["name"]: node.given["parameters"][-1] for node in nodes}
+    assert "use_sim_time" not in own.pop("flight_simulator"), "it makes the clock"
+    assert len(own) == 4
+    for given in own.values():
+        assert value(given["use_sim_time"].words[0], {"speed": speed}) is simulated
+
+
+@pytest.mark.parametrize("actions", [ROOT / "launch" / "closed_loop.launch.py"], indirect=True)
+@pytest.mark.parametrize(
+    ("namespace", "topic"), [("", "/imu/data"), ("uav1", "/uav1/imu/data"), ("/a/b/", "/a/b/imu/data")]
+)
+def test_what_is_recorded_is_in_the_namespace(actions: list[Kept], namespace: str, topic: str) -> None:
+    recorder = next(one for one in actions if one.kind == "ExecuteProcess")
+    prefix, first = next(word for word in recorder.given["cmd"] if isinstance(word, list))
+    assert value(prefix, {"namespace": namespace}) + first == topic
+    condition = recorder.given["condition"].words[0]
+    assert value(condition, {"bag": "flight7"})
+    assert not value(condition, {"bag": ""})
+
+
+@pytest.mark.parametrize("actions", [ROOT / "launch" / "identify.launch.py"], indirect=True)
+def test_the_adapter_is_started_where_an_autopilot_is_named(actions: list[Kept]) -> None:
+    adapter = next(one for one in actions if one.given.get("executable") == "adapter")
+    condition = adapter.given["condition"].words[0]
+    assert value(condition, {"autopilot": "px4"})
+    assert not value(condition, {"autopilot": ""})

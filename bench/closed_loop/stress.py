@@ -240,7 +240,7 @@ def _deaths(loop: Loop) -> Iterator[tuple[str, str, Callable[[], None]]]:
         "identifier": "no estimates for|derivatives (was )?silent",
         "exciter": "excitation (was )?silent",
         "fault_monitor": "learns what sound flight is like",
-        "adaptive_controller": "no commands for",
+        "adaptive_controller": "no commands on",
     }
     for name in NODES:
 

@@ -163,6 +163,23 @@ def test_a_stamp_that_ros_cannot_hold_is_said(standard: tuple[AdapterNode, Any, 
     probe.until(heard)
 
 
+def test_silence_is_said_under_the_autopilots_topic(
+    standard: tuple[AdapterNode, Any, Any], probe: Probe, capfd: Any
+) -> None:
+    node, imu, _ = standard
+    said = ""
+
+    def heard() -> bool:
+        nonlocal said
+        imu.publish(Imu(header=Header(stamp=probe.node.get_clock().now().to_msg())))
+        rclpy.spin_once(node, timeout_sec=0.05)
+        said += capfd.readouterr().err
+        return f"{PRESSURE}: no message " in said
+
+    probe.until(heard)
+    assert f"{IMU}: no message " not in said.partition(f"{PRESSURE}: no message ")[2]
+
+
 def test_an_attitude_is_published_in_ros_axes() -> None:
     euler = np.array([[0.3, -0.2, 1.1]])
     x, y, z, w = quaternion_from_euler(euler, "frd")[0]

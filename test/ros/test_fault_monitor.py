@@ -9,20 +9,25 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from harness import ended, start
+from rcl_interfaces.msg import Log
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import LoggingSeverity
 
 from sysid_node.ros.support.loop_watch import LoopWatch
 
+TIMES = ("onset", "found", "now")
 LAG = "actuator_lag:time_constant=0.05"
 
 
 class Listener:
-    """What `fault_monitor/faults` said last, by part."""
+    """What `fault_monitor/faults` said last, by part; and what its log said as warnings."""
 
     def __init__(self) -> None:
         self.node = rclpy.create_node("fault_listener")
         self.faults: dict[str, dict[str, str]] = {}
+        self.warnings: list[str] = []
         self.node.create_subscription(DiagnosticArray, "/fault_monitor/faults", self.take, 10)
+        self.node.create_subscription(Log, "/rosout", self.take_log, 100)
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
 
@@ -31,6 +36,10 @@ class Listener:
             status.name.partition(": ")[2]: {pair.key: pair.value for pair in status.values}
             for status in message.status
         }
+
+    def take_log(self, message: Any) -> None:
+        if message.name == "fault_monitor" and message.level == LoggingSeverity.WARN:
+            self.warnings.append(message.msg)
 
     def close(self) -> None:
         self.executor.shutdown()
@@ -69,6 +78,9 @@ def test_what_fails_in_the_loop_is_said(heard: tuple[LoopWatch, Listener]) -> No
         assert watch.set_effects(f"{LAG} control_effectiveness_loss:aileron=0.7") == ""
         until(watch, listener, lambda: listener.faults.get("aileron", {}).get("kind") == "loss of effectiveness")
         assert float(listener.faults["aileron"]["size"]) == pytest.approx(0.7, abs=0.2)
+        times = [float(listener.faults["aileron"][f"{name} (s since the first IMU message)"]) for name in TIMES]
+        assert times == sorted(times)
+        assert any("aileron" in line for line in listener.warnings), listener.warnings
         assert watch.set_effects(f"{LAG} stuck_surface:rudder=1:rudder_position=0.1") == ""
         until(watch, listener, lambda: listener.faults.get("rudder", {}).get("kind") == "stuck surface")
         assert float(listener.faults["rudder"]["size"]) == pytest.approx(0.1, abs=0.01)

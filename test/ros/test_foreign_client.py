@@ -298,6 +298,9 @@ def test_silence_is_said_under_the_resolved_name(client: Client, vehicles: Vehic
     client.flies = False
     client.until(lambda: "/uav1/imu/data silent" in client.said(CONTROLLER))
     client.until(lambda: "/uav1/imu/data: no message for" in vehicles.log("adaptive_controller"))
+    for node in ("exciter", "fault_monitor"):
+        client.until(lambda node=node: "/uav3/imu/data: no message for" in vehicles.log(node))  # type: ignore[misc]
+    client.until(lambda: "/uav2/actuators/command: no message" in vehicles.log("flight_simulator"))
     client.flies = True
     client.until(lambda: "/uav1/imu/data" not in client.said(CONTROLLER))
     assert "clock set" not in client.said(CONTROLLER)
@@ -412,6 +415,25 @@ def test_when_estimates_cease_the_surfaces_move_by_the_baseline_within_half_a_se
     client.estimates.publish(weak_elevator(client))
     answers(client, 25)  # half a second by the stamps
     assert jump(client) == pytest.approx(baseline, rel=0.05)
+
+
+def test_changes_of_what_is_flown_and_limits_reached_are_in_the_log(client: Client, vehicles: Vehicles) -> None:
+    """After gains were adapted and the baseline came back: a nose that is far too high, whatever the elevator does."""
+    log = vehicles.log("adaptive_controller")
+    assert "pitch gains: adapted" in log
+    assert "pitch gains: baseline: no estimates for" in log
+    client.flies = False
+
+    def said() -> bool:
+        client.say_air()
+        client.say_imu(tilt=-1.2)
+        client.spin(0.02)
+        log = vehicles.log("adaptive_controller")
+        return "elevator: at its limit of 0.35 rad" in log and "pitch gains: baseline: the tracking error was" in log
+
+    client.until(said)
+    client.until(lambda: "tracking: " in client.said(CONTROLLER))
+    client.flies = True
 
 
 def test_a_simulator_that_diverges_says_so_is_silent_and_can_be_reset(client: Client, vehicles: Vehicles) -> None:

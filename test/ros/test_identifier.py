@@ -320,7 +320,7 @@ def test_parameters_describe_themselves_and_refuse(probe: Probe) -> None:
     ("parameters", "words"),
     [
         (["aircraft:=nonesuch"], "aircraft 'nonesuch' is not known"),
-        (['aircraft:=""'], "parameter aircraft is empty"),
+        (['aircraft:=""'], "parameter aircraft is empty: give a name or a file, e.g. --ros-args -p aircraft:=cdrw"),
         (["body_frame:=ned"], "parameter body_frame = 'ned': expected a string, flu | frd"),
         (["publish_rate:=5"], "parameter publish_rate = 5 (integer): expected a double, 0.01 to 1000 Hz"),
         (["publish_rate:=-5.0"], "parameter publish_rate = -5.0"),

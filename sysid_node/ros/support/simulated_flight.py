@@ -123,7 +123,7 @@ class FlightSimulator(LoopNode):
         self._actuators = self.create_publisher(JointState, ACTUATORS, 50)
         self._pose = self.create_publisher(PoseStamped, "pose", 10)
         self._sim_time = self.create_publisher(ClockMessage, "/clock", 10) if self.values["speed"] != 1.0 else None
-        self.hear(JointState, COMMAND, self._on_command, LATEST, needed=False)
+        self.hear(JointState, COMMAND, self._on_command, LATEST)
 
     def _first_effects(self, effects: str) -> NDArray[np.float64]:
         """The parameters (P,) of the parameter ``effects``, whose default gives way to servos that the file states."""
@@ -166,7 +166,7 @@ class FlightSimulator(LoopNode):
             troubles.append(f"nobody flies it: no commands on {self.inputs[COMMAND].name}")
         troubles += [f"{subject}: {text}" for subject, text in self.present.items()]
         if self._commands and silence > COMMAND_AGE:
-            troubles.append(f"no commands for {silence:.1f} s: the last one is held")
+            troubles.append(f"no commands on {self.inputs[COMMAND].name} for {silence:.1f} s: the last one is held")
         line = "; ".join([f"{flown:.0f} s flown", *troubles])
         return DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK, line, values
 
