@@ -52,11 +52,19 @@ def estimated(method: str, name: str, seed: int) -> dict[str, Any]:
     begin = time.process_time()
     fit = identify(method, simulated().aircraft, [record], BatchSettings(segment=10.0)).fit
     rows = {
-        key: [e.value, e.standard_error, e.statistical_error, e.lower, e.upper, float(e.valid and fit.converged), truth]
+        key: [
+            e.value,
+            e.standard_error,
+            e.statistical_error,
+            e.lower,
+            e.upper,
+            float(e.valid and fit.search.converged),
+            truth,
+        ]
         for key, truth in true.items()
         if (e := fit.estimates.get(key)) is not None
     }
-    servos = {key: [e.value, e.standard_error] for key, e in fit.servos.items()}
+    servos = {key: [e.value, e.standard_error] for key, e in fit.systematic.servos.items()}
     return {
         "method": method, "flight": name, "seed": seed, "seconds": time.process_time() - begin, "rows": rows,
         "servos": servos,

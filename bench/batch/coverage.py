@@ -117,7 +117,7 @@ def _rows(trial: Trial, record: FlightRecord) -> dict[str, list[float]]:
         fit = identify(trial.method, AIRCRAFT, [record], trial.settings).fit
     else:
         fit = _first(trial).on([record]).fit()
-    return {name: _row(e, fit.converged) for name, e in fit.estimates.items() if name in TRUTH}
+    return {name: _row(e, fit.search.converged) for name, e in fit.estimates.items() if name in TRUTH}
 
 
 @lru_cache

@@ -43,7 +43,7 @@ def section(flights: Path) -> str:
         ("Twin Otter 018", otter, "35 to 55 s"),
     ):
         fits[name], wall, processor = _timed(lambda c=case: output_error(c.model, [c.manoeuvre]))  # type: ignore[misc]
-        costs.append([name, f"{fits[name].iterations}", f"{wall:.2f}", f"{processor:.2f}", elsewhere])
+        costs.append([name, f"{fits[name].search.iterations}", f"{wall:.2f}", f"{processor:.2f}", elsewhere])
     parts = ["### Output error"]
     for name, reference in (
         ("HFB-320", published.HFB_OUTPUT_ERROR),

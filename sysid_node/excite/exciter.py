@@ -54,32 +54,39 @@ class ExcitationEvent(NamedTuple):
 
 
 @dataclass
+class EstimateWatch:
+    """What is known of the estimates of the derivatives that are asked for."""
+
+    missing: tuple[str, ...] = ()  # derivatives that are not accurate enough
+    unknown_since: float = math.nan  # s, since when one of them is no longer valid; NaN: all are
+    known: frozenset[str] = frozenset()  # derivatives that have been valid since the last reset
+    outdated_since: float = math.nan  # s, since when estimates use data from before a change; NaN: they do not
+    reset_at: float = -math.inf  # s, of the last reset of the estimates
+
+    @property
+    def outdated(self) -> bool:
+        """Whether the estimates use data from before a change of the aircraft."""
+        return not math.isnan(self.outdated_since)
+
+
+@dataclass
 class ExciterState:
     """The state of an exciter."""
 
     aircraft: Aircraft
     settings: ExcitationSettings
     table: Array  # (N, controls) rad at RATE
+    estimates: EstimateWatch
     events: list[ExcitationEvent] = field(default_factory=list)
     begun: float = math.nan  # s; NaN = not exciting
-    missing: tuple[str, ...] = ()  # derivatives that are not accurate enough
-    unknown_since: float = math.nan
     armed: bool = False  # whether excitation may begin again when a derivative is no longer valid
     watching: bool = False  # whether it may when a fault is reported: also after it was given up
-    outdated_since: float = math.nan  # s, since when estimates use data from before a change; NaN: they do not
-    reset_at: float = -math.inf  # s, of the last reset of the estimates
-    known: frozenset[str] = frozenset()  # derivatives that have been valid since the last reset
     faults: frozenset[str] = frozenset()  # that are reported now
 
     @property
     def active(self) -> bool:
         """Whether excitation is under way."""
         return not math.isnan(self.begun)
-
-    @property
-    def outdated(self) -> bool:
-        """Whether the estimates use data from before a change of the aircraft."""
-        return not math.isnan(self.outdated_since)
 
 
 def init(aircraft: Aircraft, settings: ExcitationSettings) -> ExciterState:
@@ -96,7 +103,7 @@ def init(aircraft: Aircraft, settings: ExcitationSettings) -> ExciterState:
             f"manoeuvre {drawn.spec!r}: moves {np.abs(table).max():.3g} rad, more than the largest amplitude "
             f"{settings.largest_amplitude:g}; lower it"
         )
-    return ExciterState(aircraft, settings, table, missing=settings.derivatives)
+    return ExciterState(aircraft, settings, table, EstimateWatch(settings.derivatives))
 
 
 def start(state: ExciterState, time: float) -> None:
@@ -123,15 +130,17 @@ def receive_estimates(state: ExciterState, time: float, precision: Mapping[str, 
     estimates. Without the reset they may contradict each other for as long as the data from before count.
     """
     accuracy = state.settings.accuracy
-    state.missing = tuple(n for n in state.settings.derivatives if not precision.get(n, math.inf) <= accuracy)
+    state.estimates.missing = tuple(n for n in state.settings.derivatives if not precision.get(n, math.inf) <= accuracy)
     # excitation begins again for invalid derivatives only, not for those that have become less accurate
     invalid = [n for n in state.settings.derivatives if not math.isfinite(precision.get(n, math.inf))]
-    lost = sorted(state.known.intersection(invalid)) if state.active else invalid
-    state.known |= frozenset(state.settings.derivatives) - frozenset(invalid)
-    state.unknown_since = (time if math.isnan(state.unknown_since) else state.unknown_since) if lost else math.nan
+    lost = sorted(state.estimates.known.intersection(invalid)) if state.active else invalid
+    state.estimates.known |= frozenset(state.settings.derivatives) - frozenset(invalid)
+    state.estimates.unknown_since = (
+        (time if math.isnan(state.estimates.unknown_since) else state.estimates.unknown_since) if lost else math.nan
+    )
     if state.active:
         return _judge_active(state, time, lost)
-    if state.armed and time - state.unknown_since >= INVALID_TIME:
+    if state.armed and time - state.estimates.unknown_since >= INVALID_TIME:
         _begin_again(state, time, f"{', '.join(lost)} no longer known")
     return False
 
@@ -146,7 +155,7 @@ def receive_faults(state: ExciterState, time: float, faults: Iterable[str]) -> N
     if not new or not state.watching:
         return
     if state.active:
-        state.outdated_since = time
+        state.estimates.outdated_since = time
         _log(state, time, f"goes on: {', '.join(new)}")
     else:
         _begin_again(state, time, ", ".join(new))
@@ -155,22 +164,22 @@ def receive_faults(state: ExciterState, time: float, faults: Iterable[str]) -> N
 
 def _judge_active(state: ExciterState, time: float, lost: Sequence[str]) -> bool:
     """Whether the estimates should be reset while excitation is under way; ends it where all is known."""
-    may_reset = time - state.reset_at >= LEAST_BETWEEN_RESETS
-    if state.armed and may_reset and not state.outdated and time - state.unknown_since >= LOST_TIME:
-        state.outdated_since = time
+    may_reset = time - state.estimates.reset_at >= LEAST_BETWEEN_RESETS
+    if state.armed and may_reset and not state.estimates.outdated and time - state.estimates.unknown_since >= LOST_TIME:
+        state.estimates.outdated_since = time
         _log(state, time, f"goes on: {', '.join(lost)} no longer known")
-    if state.outdated and time - state.outdated_since >= RESET_DELAY:
-        state.outdated_since, state.unknown_since = math.nan, math.nan
-        state.reset_at, state.known = time, frozenset()
+    if state.estimates.outdated and time - state.estimates.outdated_since >= RESET_DELAY:
+        state.estimates.outdated_since, state.estimates.unknown_since = math.nan, math.nan
+        state.estimates.reset_at, state.estimates.known = time, frozenset()
         _log(state, time, "estimates begun anew")
         return True
-    if not (state.missing or state.outdated):
+    if not (state.estimates.missing or state.estimates.outdated):
         _end(state, time, "known")
     return False
 
 
 def _begin_again(state: ExciterState, time: float, why: str) -> None:
-    state.begun = state.outdated_since = time
+    state.begun = state.estimates.outdated_since = time
     _log(state, time, f"begun again: {why}")
 
 
@@ -181,7 +190,7 @@ def step(state: ExciterState, time: float, flight: LimitedQuantities) -> Array:
         if exceeded:
             stop(state, time, f"aborted: {exceeded}")
         elif time - state.begun > state.settings.longest:
-            _end(state, time, f"given up: {', '.join(state.missing)} not known")
+            _end(state, time, f"given up: {', '.join(state.estimates.missing)} not known")
             state.armed = False
     if not state.active:
         return np.zeros(state.table.shape[1])
@@ -209,7 +218,7 @@ def _exceeded_limit(state: ExciterState, flight: LimitedQuantities) -> str:
 
 def _end(state: ExciterState, time: float, why: str) -> None:
     _log(state, time, f"{why} after {time - state.begun:.1f} s")
-    state.begun = state.unknown_since = state.outdated_since = math.nan
+    state.begun = state.estimates.unknown_since = state.estimates.outdated_since = math.nan
 
 
 def _log(state: ExciterState, time: float, text: str) -> None:

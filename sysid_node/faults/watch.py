@@ -87,7 +87,7 @@ def on_actuators(
     """Take joint positions: rad, throttle 0..1 or N."""
     watch.heard[ACTUATORS] = (arrived, watch.now)
     controls = _controls(watch.intake.actuation, names, positions)
-    if controls and watch.intake.bases:
+    if controls and watch.intake.imu.bases:
         watch.moved = _time_of(watch.intake, stamp_ns)
         watch.off_command = servos.position(watch.servos, watch.moved, controls)
     _take(watch, intake.on_actuators(watch.intake, stamp_ns, names, positions))
@@ -96,7 +96,7 @@ def on_actuators(
 def on_command(watch: MessageWatch, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> None:
     """Take a command to the joints; without a stamp, it has the time of the last positions."""
     controls = _controls(watch.intake.actuation, names, positions)
-    moment = _time_of(watch.intake, stamp_ns) if stamp_ns and watch.intake.bases else watch.moved
+    moment = _time_of(watch.intake, stamp_ns) if stamp_ns and watch.intake.imu.bases else watch.moved
     if controls and math.isfinite(moment):
         servos.command(watch.servos, moment, controls)
 
@@ -158,7 +158,7 @@ def _take(watch: MessageWatch, samples: Sequence[AlignedSample]) -> None:
 
 def _time_of(taken: AlignmentState, stamp_ns: int) -> float:
     """Seconds since the first IMU message, the samples' time."""
-    base = taken.bases[-1]
+    base = taken.imu.bases[-1]
     return (stamp_ns - base.stamp + base.since) / _SECOND
 
 

@@ -246,7 +246,7 @@ class AdaptiveController(LoopNode):
         received, extra = self._extra
         excitation = extra if time.monotonic() - received < EXCITATION_AGE else controller.NO_EXCITATION
         command = controller.step(self._state, sensed, self._points.current(time.monotonic()), excitation)
-        self._steps, self._steps_at_limit = self._steps + 1, self._steps_at_limit + self._state.law.at_limit
+        self._steps, self._steps_at_limit = self._steps + 1, self._steps_at_limit + self._state.law.surfaces.at_limit
         stamp = self._start_ns + round(NANOSECONDS * sensed.time)
         self._command.publish(named(stamp, self._joints(command)))
         self._tracking.publish(named(stamp, self._errors(sensed)))

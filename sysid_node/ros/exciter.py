@@ -102,7 +102,11 @@ class Exciter(LoopNode):
         state = self._state
         last = state.events[-1].text if state.events else "nothing flown yet"
         doing = f"exciting for {self._now - state.begun:.1f} s" if state.active else last
-        values = {"active": state.active, "not yet known": " ".join(state.missing), "events": len(state.events)}
+        values = {
+            "active": state.active,
+            "not yet known": " ".join(state.estimates.missing),
+            "events": len(state.events),
+        }
         return DiagnosticStatus.OK, doing, {**values, "last event": last}
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:

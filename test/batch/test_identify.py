@@ -25,7 +25,7 @@ def found(request):
 
 
 def test_every_method_finds_the_truth(found):
-    assert found.fit.converged
+    assert found.fit.search.converged
     assert set(found.fit.estimates) == set(TRUTH)
     assert np.mean(np.abs(scores(found.fit.estimates)) < 2.2) > 0.8
     assert np.abs(scores(found.fit.estimates)).max() < 5.0
@@ -43,7 +43,7 @@ def test_every_method_answers_a_held_out_flight(found):
 def test_filter_error_on_two_states_that_the_others_are_measured_for():
     settings = dataclasses.replace(QUICK, states=("alpha", "q"), rate=0.0)
     found = identify("filter_error", KESTREL, [flight(1)], settings, [flight(2, turn=-1)])
-    assert found.fit.converged
+    assert found.fit.search.converged
     assert np.abs(scores(found.fit.estimates)).max() < 5.0
     assert {"CL", "Cm", "alpha", "q", "az"} == set(found.holdout["kestrel -1 #2"])
     assert found.holdout["kestrel -1 #2"]["q"]["r_squared"] > 0.95
@@ -60,7 +60,7 @@ def test_output_error_is_the_sharpest_on_still_air():
 def test_a_flight_without_a_sideslip_vane_can_still_be_integrated():
     found = identify("output_error", KESTREL, [without(flight(1), "beta")], QUICK)
     assert any("started from the aircraft file's values" in remark for remark in found.fit.remarks)
-    assert found.fit.converged
+    assert found.fit.search.converged
     assert abs(found.fit.values["Cn_beta"] - TRUTH["Cn_beta"]) < 4 * found.fit.estimates["Cn_beta"].standard_error
 
 

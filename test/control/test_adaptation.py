@@ -227,7 +227,7 @@ def test_the_clock_may_step_back(state: controller.ControllerState) -> None:
     flown(state, 1.0, beliefs(half=0.02), 100.0)
     flown(state, 8.0, beliefs(ELEVATOR, half=0.02), 3.0)
     np.testing.assert_allclose(state.axes[0].flown.gains[0, 1], 2.5 * state.axes[0].axis.baseline[0, 1], rtol=0.01)
-    assert len(state.law.pending) < 10
+    assert len(state.law.surfaces.pending) < 10
     assert len(state.law.behind.pending) < 10
 
 

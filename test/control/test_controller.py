@@ -107,7 +107,7 @@ def test_the_clock_may_step_back() -> None:
 def test_new_gains_do_not_move_the_surfaces() -> None:
     """Feedback holds a deflection, here against a trim error; other gains hold it from the first moment on."""
     state, now = fly(SetPoints(roll=0.2), 12.0, excitation=0.03)
-    before = state.law.command
+    before = state.law.surfaces.command
     for axis in state.axes:
         axis.flown = axis.flown._replace(gains=0.6 * axis.flown.gains)
     _, _, _, p, q, r, phi, theta, _, V, alpha, beta = now.outputs.tolist()

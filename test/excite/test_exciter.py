@@ -39,7 +39,7 @@ def test_it_flies_the_manoeuvre_and_stops_when_enough_is_known(state: exciter.Ex
     assert np.abs(flown).max() <= 0.02 + 1e-9
     exciter.receive_estimates(state, 15.0, {**KNOWN, "Cm_de": 0.06})
     assert state.active
-    assert state.missing == ("Cm_de",)
+    assert state.estimates.missing == ("Cm_de",)
     exciter.receive_estimates(state, 16.0, KNOWN)
     assert not state.active
     assert last(state) == "known after 6.0 s"

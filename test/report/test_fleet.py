@@ -97,7 +97,8 @@ def test_each_tail_has_an_aircraft_file_with_the_fleets_values(written):
 
 def test_a_drift_in_a_technicians_words(written):
     drift = written[2].drifts["cdrw", "t3", "Cl_da"]
-    drift = replace(drift, kind="step", before=0.2, change=-0.036, error=0.004, since=START.timestamp() / DAY)
+    course = replace(drift.course, kind="step", since=START.timestamp() / DAY)
+    drift = replace(drift, course=course, before=0.2, change=-0.036, error=0.004)
     assert (
         tail_sentence("t3", [drift])
         == "t3: aileron power \u221218\u202f% since 1 January 2026; the others are unchanged."

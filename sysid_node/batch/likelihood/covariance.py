@@ -8,7 +8,7 @@ import numpy as np
 
 from sysid_node.batch.likelihood.problem import LikelihoodProblem, inverted
 from sysid_node.batch.likelihood.unknowns import Unknowns
-from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.batch_fit import BatchFit, SearchEnd
 from sysid_node.batch.results.estimate import ParameterEstimate, confidence_interval
 from sysid_node.batch.results.identifiability import (
     UnidentifiableGroups,
@@ -47,13 +47,15 @@ def assessed_fit(
         noise=dict(zip(unknowns.model.outputs, np.linalg.norm(noise, axis=1).tolist(), strict=True)),
         log_det=float(2.0 * np.sum(np.log(np.diag(noise)))),
         responses=responses,
-        converged=not complaint,
-        iterations=iterations,
-        message=complaint or f"converged after {iterations} rounds of noise relaxation",
+        search=SearchEnd(
+            converged=not complaint,
+            iterations=iterations,
+            message=complaint or f"converged after {iterations} rounds of noise relaxation",
+            unknowns=z,
+        ),
         remarks=(*at_bounds, *identifiability_remarks(covariance, unknowns.names, groups)),
         nuisance=unknowns.nuisance(z),
         extras=extras or {},
-        unknowns=z,
     )
 
 

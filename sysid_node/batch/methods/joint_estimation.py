@@ -22,7 +22,7 @@ from sysid_node.batch.models.model import StateSpaceModel
 from sysid_node.batch.models.model_for_flights import model_for_flights, require_length
 from sysid_node.batch.regression.filtering import averaging_factor, block_averaged
 from sysid_node.batch.regression.prior import tolerance_of
-from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.batch_fit import BatchFit, SearchEnd
 from sysid_node.batch.results.estimate import ParameterEstimate
 from sysid_node.batch.results.identifiability import identifiability_remarks
 from sysid_node.batch.results.parameter_track import ParameterTrack
@@ -108,9 +108,12 @@ class JointEstimation:
             noise=dict(zip(self.model.outputs, deviation.tolist(), strict=True)),
             log_det=float(2.0 * np.sum(np.log(np.maximum(deviation, 1e-300)))),
             responses=responses,
-            converged=True,
-            iterations=1,
-            message=f"one pass along {samples} samples, started at the aircraft file's values within its tolerances",
+            search=SearchEnd(
+                converged=True,
+                iterations=1,
+                message=f"one pass along {samples} samples, started at the aircraft file's values within its "
+                "tolerances",
+            ),
             remarks=(*self.remarks, *identifiability_remarks(track.covariance, track.names, ())),
             extras=self._noise_levels(),
             track=track,

@@ -70,8 +70,8 @@ class MaximumLikelihoodEstimation:
 
         Both with the unknowns (n,) that the search of ``fit`` ended with; the Jacobian is with respect to these.
         """
-        assert fit.unknowns is not None
-        z, base = fit.unknowns, self._problem(self.pieces)
+        assert fit.search.unknowns is not None
+        z, base = fit.search.unknowns, self._problem(self.pieces)
         noise = base.noise(z)
 
         def residuals(records: Sequence[FlightRecord]) -> Array:

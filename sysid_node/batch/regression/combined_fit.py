@@ -9,7 +9,7 @@ import numpy as np
 from sysid_node.aircraft.names import split_derivative
 from sysid_node.batch.regression.linear_regression import Regression
 from sysid_node.batch.regression.measured_coefficients import MeasuredCoefficients
-from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.batch_fit import BatchFit, SearchEnd
 from sysid_node.batch.results.estimate import ParameterEstimate
 from sysid_node.batch.results.identifiability import identifiability_remarks
 from sysid_node.batch.results.response import ModelResponse
@@ -33,9 +33,7 @@ def combined_fit(
         noise=noise,
         log_det=float(2.0 * np.sum(np.log(np.maximum(list(noise.values()), 1e-300)))),
         responses=[_response(regressions, flight, k) for k, flight in enumerate(flights)],
-        converged=True,
-        iterations=1,
-        message="linear least squares",
+        search=SearchEnd(converged=True, iterations=1, message="linear least squares"),
         remarks=_remarks(regressions, flights),
     )
 

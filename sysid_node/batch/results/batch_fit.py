@@ -14,14 +14,32 @@ from sysid_node.flight.record import Array
 
 
 @dataclass(frozen=True)
+class SearchEnd:
+    """How the search for the estimates ended, in ``message`` in words."""
+
+    converged: bool
+    iterations: int
+    message: str
+    unknowns: Array | None = None  # (n,) with which a search for the maximum likelihood ended
+
+
+@dataclass(frozen=True)
+class SystematicPart:
+    """What the flights tell of the imperfections that every method has in common; empty where it was not asked."""
+
+    servos: Mapping[str, ParameterEstimate] = field(default_factory=dict)  # by control: how late it follows, s
+    budget: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # shares of each variance by source
+
+
+@dataclass(frozen=True)
 class BatchFit:
     """The outcome of one estimation.
 
     ``covariance`` (P, P) of the parameters in the order of ``estimates``, for coloured residuals. ``noise`` is the
     residuals' standard deviation by output; ``log_det`` = ln det R, which maximum likelihood minimises (of equation
     error: of the equations' residual variances). ``nuisance`` holds what else was estimated for each manoeuvre
-    (initial states, biases). ``converged`` and ``message`` say how the estimation ended; ``remarks`` are sentences for
-    the reader: which parameters are not distinguished, which lie at a bound, what was left out.
+    (initial states, biases). ``remarks`` are sentences for the reader: which parameters are not distinguished, which
+    lie at a bound, what was left out.
     """
 
     method: str
@@ -30,15 +48,11 @@ class BatchFit:
     noise: Mapping[str, float]
     log_det: float
     responses: Sequence[ModelResponse]
-    converged: bool
-    iterations: int
-    message: str
+    search: SearchEnd
     remarks: tuple[str, ...] = ()
     nuisance: Sequence[Mapping[str, float]] = ()
     extras: Mapping[str, float] = field(default_factory=dict)  # e.g. process noise
-    unknowns: Array | None = None  # (n,) with which a search for the maximum likelihood ended
-    servos: Mapping[str, ParameterEstimate] = field(default_factory=dict)  # by control: how late it follows, s
-    budget: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # shares of each variance by source
+    systematic: SystematicPart = SystematicPart()
     track: ParameterTrack | None = None  # estimates over time, of a filter that passes once along the flights
 
     @property

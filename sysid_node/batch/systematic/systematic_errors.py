@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.batch_fit import BatchFit, SystematicPart
 from sysid_node.batch.results.estimate import NORMAL_95, ParameterEstimate, confidence_interval
 from sysid_node.batch.systematic.clocks import LATE_COLUMNS, corrected, is_timing
 from sysid_node.batch.systematic.flight_posterior import FlightPosterior, Imperfection
@@ -69,8 +69,7 @@ def with_systematic_errors(
         fit,
         estimates=estimates,
         covariance=fit.covariance + systematic,
-        servos=servos(posterior),
-        budget=budget,
+        systematic=SystematicPart(servos(posterior), budget),
     )
 
 

@@ -49,6 +49,16 @@ class LawDesign:
 
 
 @dataclass
+class SurfaceState:
+    """What the three surfaces were told, and where the feedback has moved them by the model of the actuators."""
+
+    command: Array | None = None  # (3,) rad, the last
+    at_limit: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(3, bool))  # at the end of their travel
+    pending: deque[tuple[float, Array]] = field(default_factory=deque)  # feedback within the actuators' delay
+    by_feedback: Array = field(default_factory=lambda: np.zeros(3))  # rad
+
+
+@dataclass
 class LawState:
     """The state of the control law."""
 
@@ -59,13 +69,9 @@ class LawState:
     density: float = math.nan
     integrals: Array = field(default_factory=lambda: np.zeros(2))  # of theta's and phi's errors, rad s
     thrust: float = 0.0  # N, of the airspeed's integral
-    command: Array | None = None  # (3,) rad, the last
-    surfaces: Array = field(default_factory=lambda: np.zeros(3))  # rad, deflections due to feedback, by the servo model
+    surfaces: SurfaceState = field(default_factory=SurfaceState)
     gains: tuple[Array, ...] = ()  # (m, n) of both axes, the last
-    pending: deque[tuple[float, Array]] = field(default_factory=deque)  # feedback within the actuators' delay
     wanted: ReferenceMotion | None = None  # the delayed reference, with which the motion is compared
-    #: Surfaces at the end of their travel.
-    at_limit: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(3, bool))
 
 
 def init(aircraft: Aircraft, settings: ControllerSettings) -> LawState:
@@ -173,8 +179,8 @@ def _errors(law: LawState, measured: Measurements, late: ReferenceMotion, level:
     side = (measured.beta - late.beta, measured.p - late.p, measured.r - late.r, measured.phi - late.phi)
     first, second = (np.nan_to_num(np.array(x), nan=0.0, posinf=0.0, neginf=0.0) for x in (pitch, side))
     return (
-        np.concatenate([first, law.integrals[:1], law.surfaces[:1]]),
-        np.concatenate([second, law.integrals[1:], law.surfaces[1:]]),
+        np.concatenate([first, law.integrals[:1], law.surfaces.by_feedback[:1]]),
+        np.concatenate([second, law.integrals[1:], law.surfaces.by_feedback[1:]]),
     )
 
 
@@ -203,17 +209,19 @@ def _follow_surfaces(law: LawState, time: float, feedback: Array, step: float) -
     A surface moves by its whole travel at most, whatever the feedforward has asked for.
     """
     feedback = np.clip(feedback, -2.0 * law.design.limits, 2.0 * law.design.limits)
-    late = reference.delayed(law.pending, time, feedback, law.design.settings.delay, step)
-    law.surfaces += (1.0 - math.exp(-step / law.design.settings.actuator_lag)) * (late - law.surfaces)
+    surfaces, settings = law.surfaces, law.design.settings
+    late = reference.delayed(surfaces.pending, time, feedback, settings.delay, step)
+    surfaces.by_feedback += (1.0 - math.exp(-step / settings.actuator_lag)) * (late - surfaces.by_feedback)
 
 
 def _limited(law: LawState, wanted: Array, step: float) -> tuple[Array, NDArray[np.bool_]]:
     """The command (3,) within its limits of amplitude and rate, and which surfaces are limited."""
     within = np.clip(wanted, -law.design.limits, law.design.limits)
-    if law.command is not None:
+    surfaces = law.surfaces
+    if surfaces.command is not None:
         reach = law.design.settings.command_rate * step
-        within = np.clip(within, law.command - reach, law.command + reach)
-    law.command, law.at_limit = within, np.abs(within) >= law.design.limits
+        within = np.clip(within, surfaces.command - reach, surfaces.command + reach)
+    surfaces.command, surfaces.at_limit = within, np.abs(within) >= law.design.limits
     return within, np.abs(within - wanted) > 1e-9
 
 

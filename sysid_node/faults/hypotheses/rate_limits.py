@@ -67,20 +67,27 @@ class _Control(NamedTuple):
 
 
 @dataclass
-class RateLimits:
-    """The state of the comparison, for m controls, J lags and K limits."""
+class _Servos:
+    """Servos that follow the commands of m controls: by J lags without a limit, and with each of K limits."""
 
-    controls: tuple[_Control, ...]
-    count: int  # m, of the aircraft's controls
-    rows: list[deque[Array]]  # by control, the last blocks before whitening
-    grams: list[Array]
+    count: int  # m
+    beyond: Array  # (m, K) rad: limited less ``SERVO``'s output
+    area_beyond: Array  # (m, K) rad s, since the block began
+    limiting: bool = False  # whether anything is beyond
     time: float = math.nan  # s, of the last sample
     commands: list[float] = field(default_factory=list)  # (m,) rad; empty before the first
     lagged: list[list[float]] = field(default_factory=list)  # (m, J) rad
     areas: list[list[float]] = field(default_factory=list)  # (m, J) rad s, since the block began
-    beyond: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (m, K) rad: limited less ``SERVO``'s output
-    area_beyond: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (m, K) rad s
-    limiting: bool = False  # whether anything is beyond
+
+
+@dataclass
+class RateLimits:
+    """The state of the comparison."""
+
+    controls: tuple[_Control, ...]
+    servos: _Servos
+    rows: list[deque[Array]]  # by control, the last blocks before whitening
+    grams: list[Array]
     weight: float = 0.0  # blocks that count
     blocks: int = 0
     found: dict[str, Fault] = field(default_factory=dict)
@@ -108,50 +115,51 @@ def init(aircraft: Aircraft, terms: Terms) -> RateLimits:
     m, J, K = len(aircraft.controls), len(LAGS), LIMITS.size
     rows: list[deque[Array]] = [deque(maxlen=2) for _ in controls]
     grams = [np.zeros((n, n)) for n in (1 + c.others.size + J + K for c in controls)]
-    return RateLimits(tuple(controls), m, rows, grams, beyond=np.zeros((m, K)), area_beyond=np.zeros((m, K)))
+    return RateLimits(tuple(controls), _Servos(m, np.zeros((m, K)), np.zeros((m, K))), rows, grams)
 
 
 def move(state: RateLimits, time: float, sample: Sequence[float]) -> None:
     """Let servos with each limit follow the commands of an aligned sample at ``time`` (s)."""
-    commands = list(sample[_FIRST : _FIRST + state.count])
+    servos = state.servos
+    commands = list(sample[_FIRST : _FIRST + servos.count])
     if not math.isfinite(math.fsum(commands)):
         return
-    step, state.time = time - state.time, time
-    if not state.commands or not 0.0 < step < PERIOD:
-        state.commands, state.lagged = commands, [[u] * len(LAGS) for u in commands]
-        state.areas = [[0.0] * len(LAGS) for _ in commands]
-        state.beyond[:], state.area_beyond[:], state.limiting = 0.0, 0.0, False
+    step, servos.time = time - servos.time, time
+    if not servos.commands or not 0.0 < step < PERIOD:
+        servos.commands, servos.lagged = commands, [[u] * len(LAGS) for u in commands]
+        servos.areas = [[0.0] * len(LAGS) for _ in commands]
+        servos.beyond[:], servos.area_beyond[:], servos.limiting = 0.0, 0.0, False
         return
     decays = [math.exp(-step / lag) if lag else 0.0 for lag in LAGS]
-    before = [lagged[SERVO] for lagged in state.lagged]
-    for i, (earlier, now) in enumerate(zip(state.commands, commands, strict=True)):
-        aim, lagged, areas = 0.5 * (earlier + now), state.lagged[i], state.areas[i]  # straight lines between samples
+    before = [lagged[SERVO] for lagged in servos.lagged]
+    for i, (earlier, now) in enumerate(zip(servos.commands, commands, strict=True)):
+        aim, lagged, areas = 0.5 * (earlier + now), servos.lagged[i], servos.areas[i]  # straight lines between samples
         for j, decay in enumerate(decays):
             after = aim + (lagged[j] - aim) * decay if decay else now
             areas[j] += 0.5 * step * (lagged[j] + after)
             lagged[j] = after
-    state.commands = commands
-    moved = [lagged[SERVO] - old for lagged, old in zip(state.lagged, before, strict=True)]
-    if state.limiting or max(map(abs, moved), default=0.0) > LIMITS[0] * step:
-        _limit(state, moved, step)
+    servos.commands = commands
+    moved = [lagged[SERVO] - old for lagged, old in zip(servos.lagged, before, strict=True)]
+    if servos.limiting or max(map(abs, moved), default=0.0) > LIMITS[0] * step:
+        _limit(servos, moved, step)
 
 
-def _limit(state: RateLimits, moved: Sequence[float], step: float) -> None:
+def _limit(servos: _Servos, moved: Sequence[float], step: float) -> None:
     """Advance the limited positions, less the output of the lag, which ``moved`` (m,) rad in the ``step`` (s)."""
-    off, reach = np.array(moved)[:, None] - state.beyond, LIMITS * step
+    off, reach = np.array(moved)[:, None] - servos.beyond, LIMITS * step
     after = np.minimum(np.maximum(off, -reach), reach) - off
-    state.area_beyond += 0.5 * step * (state.beyond + after)
-    state.beyond = after
-    state.limiting = bool(np.abs(after).max() > 1e-9)
+    servos.area_beyond += 0.5 * step * (servos.beyond + after)
+    servos.beyond = after
+    servos.limiting = bool(np.abs(after).max() > 1e-9)
 
 
 def take(state: RateLimits, block: Block, whitening: Array) -> None:
     """Take the block that ends with the last sample; ``whitening`` (2, 6) are the residuals' autoregressions."""
-    k = block.regressors[OFFSET]
-    if state.commands:
-        means, beyond = np.array(state.areas) / PERIOD, state.area_beyond / PERIOD
-        state.areas, state.area_beyond = [[0.0] * len(LAGS) for _ in state.commands], np.zeros_like(state.beyond)
-    if not state.commands or not block.follows:
+    k, servos = block.regressors[OFFSET], state.servos
+    if servos.commands:
+        means, beyond = np.array(servos.areas) / PERIOD, servos.area_beyond / PERIOD
+        servos.areas, servos.area_beyond = [[0.0] * len(LAGS) for _ in servos.commands], np.zeros_like(servos.beyond)
+    if not servos.commands or not block.follows:
         for earlier in state.rows:
             earlier.clear()
         return

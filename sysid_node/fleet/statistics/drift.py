@@ -18,30 +18,40 @@ _HALF_NORMAL = float(stats.norm.ppf(0.975))
 
 
 @dataclass(frozen=True)
+class DriftCourse:
+    """When a derivative changes: ``kind`` is ``step``, ``trend`` or ``configuration``. Dates are days since 1970.
+
+    ``values`` (n,) is what the change is multiplied by in each flight. ``first`` and ``last`` are for a step the dates
+    between which it lies with 95 % confidence, else those of the first and the last flight. ``since`` is the date of
+    the first flight after the step.
+    """
+
+    kind: str
+    values: Array
+    first: float
+    last: float
+    since: float
+    configuration: str
+
+
+@dataclass(frozen=True)
 class Drift:
     """What one tail's derivative does over time, significant or not.
 
-    ``kind`` is ``step``, ``trend`` or ``configuration``. ``change`` is the step, the trend's change from the first
-    flight to the last, or the difference of the configuration, with its standard error ``error``, in the derivative's
-    unit; ``before`` is the level that it refers to. ``first`` and ``last`` are days since 1970: for a step those
-    between which it lies with 95 % confidence, else those of the first and the last flight. ``since`` (days) is the
-    date of the first flight after the step. ``course`` (n,) is what the change is multiplied by in each flight.
+    ``change`` is the step, the trend's change from the first flight to the last, or the difference of the
+    configuration, with its standard error ``error``, in the derivative's unit; ``before`` is the level that it refers
+    to.
     """
 
     aircraft: str
     tail: str
     name: str
-    kind: str
+    flights: tuple[str, ...]
+    course: DriftCourse
     change: float
     error: float
     before: float
     p_value: float
-    first: float
-    last: float
-    since: float
-    configuration: str
-    flights: tuple[str, ...]
-    course: Array
     adjusted_p: float = 1.0
     significant: bool = False
 
@@ -64,10 +74,9 @@ def find_drift(series: DerivativeSeries, omega: float, freedom: int, maintenance
     before = float(np.average(series.value - change * chosen.values, weights=1.0 / variance))
     first, last = _dates(series, courses, tests)
     since = float(series.day[chosen.place]) if chosen.kind == "step" else float(series.day[0])
-    return Drift(
-        series.aircraft, series.tails[0], series.name, chosen.kind, change, float(tests.error[best]), before,
-        tests.p_value, first, last, since, chosen.configuration, series.flight, chosen.values,
-    )  # fmt: skip
+    course = DriftCourse(chosen.kind, chosen.values, first, last, since, chosen.configuration)
+    of_tail = series.aircraft, series.tails[0], series.name, series.flight
+    return Drift(*of_tail, course, change, float(tests.error[best]), before, tests.p_value)
 
 
 def _tested(

@@ -59,7 +59,7 @@ def without_drift(series: DerivativeSeries, drifts: Mapping[TailKey, Drift]) -> 
     for j, tail in enumerate(series.tails):
         drift = drifts.get((series.aircraft, tail, series.name))
         if drift is not None and drift.significant:
-            value[series.tail == j] -= drift.change * drift.course
+            value[series.tail == j] -= drift.change * drift.course.values
     return series.with_values(value)
 
 
@@ -70,9 +70,9 @@ def known_changes(
     return {
         (aircraft, tail): [note.date.timestamp() / DAY for note in maintenance if note.concerns(aircraft, tail)]
         + [
-            drift.since
+            drift.course.since
             for key, drift in drifts.items()
-            if key[:2] == (aircraft, tail) and drift.significant and drift.kind == "step"
+            if key[:2] == (aircraft, tail) and drift.significant and drift.course.kind == "step"
         ]
         for aircraft, names in tails.items()
         for tail in names

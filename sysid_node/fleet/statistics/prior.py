@@ -55,7 +55,7 @@ def tail_prior(population: Population, tail: str, drift: Drift | None) -> TailPr
         float(fit.by_tail.level_error[j] ** 2 + np.nan_to_num(fit.flights.value) ** 2),
     )
     if drift is not None:
-        value += drift.change * float(drift.course[-1])
+        value += drift.change * float(drift.course.values[-1])
         variance += drift.error**2
     count = int((population.series.tail == j).sum())
     return TailPrior(

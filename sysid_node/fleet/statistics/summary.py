@@ -122,9 +122,12 @@ def _population(population: Population) -> dict[str, Any]:
 
 
 def _drift(drift: Drift) -> dict[str, Any]:
-    days = {key: iso_date(getattr(drift, key)) for key in ("first", "last", "since")}
-    kept = ("aircraft", "tail", "name", "kind", "change", "error", "before", "p_value", "adjusted_p", "significant")
-    return {key: _plain(getattr(drift, key)) for key in kept} | days | {"configuration": drift.configuration}
+    course = drift.course
+    whose = {"aircraft": drift.aircraft, "tail": drift.tail, "name": drift.name, "kind": course.kind}
+    kept = ("change", "error", "before", "p_value", "adjusted_p", "significant")
+    days = {key: iso_date(getattr(course, key)) for key in ("first", "last", "since")}
+    sizes = {key: _plain(getattr(drift, key)) for key in kept}
+    return whose | sizes | days | {"configuration": course.configuration}
 
 
 def _cause(cause: PooledCause) -> dict[str, Any]:

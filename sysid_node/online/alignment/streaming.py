@@ -132,6 +132,16 @@ class _Neighbours:
 
 
 @dataclass(slots=True)
+class _ImuMessages:
+    """The IMU's messages: those that wait, and the time base that their stamps make."""
+
+    clock: _Clock = field(default_factory=_Clock)
+    waiting: deque[_Waiting] = field(default_factory=deque)
+    since: int = 0  # of the last one
+    bases: deque[_Base] = field(default_factory=lambda: deque(maxlen=16))  # of the last epochs
+
+
+@dataclass(slots=True)
 class AlignmentState:
     """All that the alignment remembers. ``accepted`` and ``rejected`` count messages by topic (and reason)."""
 
@@ -139,12 +149,9 @@ class AlignmentState:
     air_density: float
     gap: int  # ns
     buffer: int  # ns
-    clock: _Clock = field(default_factory=_Clock)
-    waiting: deque[_Waiting] = field(default_factory=deque)
+    imu: _ImuMessages = field(default_factory=_ImuMessages)
     air_data: _Neighbours = field(default_factory=lambda: _Neighbours(AIR_DATA))
     actuators: _Neighbours = field(default_factory=lambda: _Neighbours(ACTUATORS))
-    since: int = 0  # of the last IMU message
-    bases: deque[_Base] = field(default_factory=lambda: deque(maxlen=16))  # of the last epochs
     commands: RecordedCommands | None = None  # None: the topic carries positions
     commands_from: float = math.inf  # s: time of the first sample whose deflections follow from commands
     joints: tuple[Sequence[str], tuple[int, ...]] = ((), ())  # the last message's names, and our joints among them
@@ -169,21 +176,22 @@ def on_imu(state: AlignmentState, stamp_ns: int, values: Values) -> list[Aligned
 
     Never raises for any numbers.
     """
-    fault = imu_fault(values) or state.clock.fault(stamp_ns)
+    imu = state.imu
+    fault = imu_fault(values) or imu.clock.fault(stamp_ns)
     if fault is not None:
         refuse(state, IMU, fault)
         return []
     state.accepted[IMU] += 1
-    epoch = state.clock.epoch
-    if not state.bases or state.bases[-1].epoch != epoch:
-        state.bases.append(_Base(epoch, state.since + state.gap + BREAK_NS if epoch else 0, stamp_ns))
-    base = state.bases[-1]
-    state.since = base.since + (stamp_ns - base.stamp)
-    state.waiting.append(_Waiting(epoch, stamp_ns, state.since, values))
+    epoch, waiting = imu.clock.epoch, imu.waiting
+    if not imu.bases or imu.bases[-1].epoch != epoch:
+        imu.bases.append(_Base(epoch, imu.since + state.gap + BREAK_NS if epoch else 0, stamp_ns))
+    base = imu.bases[-1]
+    imu.since = base.since + (stamp_ns - base.stamp)
+    waiting.append(_Waiting(epoch, stamp_ns, imu.since, values))
     # where another of this epoch waits already, it waits for another topic, and still does
-    waits = len(state.waiting) > 1 and state.waiting[-2].epoch == epoch
+    waits = len(waiting) > 1 and waiting[-2].epoch == epoch
     complete = [] if waits else _release(state)
-    while state.waiting and state.since - state.waiting[0].since > state.buffer:
+    while waiting and imu.since - waiting[0].since > state.buffer:
         _give_up(state)
         complete += _release(state)
     return complete
@@ -219,7 +227,7 @@ def on_actuators(
 def stamp_of(state: AlignmentState, time: float) -> int:
     """The header stamp, in ns, of the IMU message whose sample has this time; for samples just returned."""
     since = round(time * 1e9)
-    base = next(base for base in reversed(state.bases) if base.since <= since)
+    base = next(base for base in reversed(state.imu.bases) if base.since <= since)
     return base.stamp + since - base.since
 
 
@@ -228,9 +236,11 @@ def go_on_from(state: AlignmentState, first: int, last: int, waiting: Sequence[i
 
     ``waiting`` are the stamps of the last of them that no sample has been made of, ``values`` what they hold.
     """
-    state.clock.last, state.since = last, last - first
-    state.bases.append(_Base(0, 0, first))
-    state.waiting.extend(_Waiting(0, *each) for each in zip(waiting, (t - first for t in waiting), values, strict=True))
+    state.imu.clock.last, state.imu.since = last, last - first
+    state.imu.bases.append(_Base(0, 0, first))
+    state.imu.waiting.extend(
+        _Waiting(0, *each) for each in zip(waiting, (t - first for t in waiting), values, strict=True)
+    )
 
 
 def go_on_after(state: AlignmentState, topic: str, stamps: Sequence[int], values: Sequence[Values]) -> None:
@@ -273,7 +283,7 @@ def _on_neighbour(
 def _release(state: AlignmentState) -> list[AlignedSample]:
     """The samples whose neighbours have come, in order; counts those that have none close enough."""
     complete: list[AlignedSample] = []
-    waiting = state.waiting
+    waiting = state.imu.waiting
     while waiting:
         imu = waiting[0]
         air_data = _neighbours_of(state, state.air_data, imu)
@@ -317,11 +327,11 @@ def _interpolated(pair: _Pair, stamp: int) -> Sequence[float]:
 
 def _give_up(state: AlignmentState) -> None:
     """Leaves out the IMU message that has waited longest, and takes it that the topics' clocks are set apart."""
-    imu = state.waiting.popleft()
+    imu = state.imu.waiting.popleft()
     missing = isinstance(_neighbours_of(state, state.air_data, imu), _Missing)
     refuse(state, IMU, gap(AIR_DATA if missing else ACTUATORS))
     for topic in (state.air_data, state.actuators):
-        topic.ahead = topic.clock.epoch - state.clock.epoch
+        topic.ahead = topic.clock.epoch - state.imu.clock.epoch
 
 
 def _neighbours_of(state: AlignmentState, topic: _Neighbours, imu: _Waiting) -> _Pair | _Missing:
@@ -344,7 +354,7 @@ def _neighbours_of(state: AlignmentState, topic: _Neighbours, imu: _Waiting) -> 
         return _Missing.FOR_GOOD
     right = entries[1] if len(entries) > 1 and entries[1].epoch == epoch else None
     if left is None or right is None:
-        both_set = topic.clock.epoch > epoch and state.clock.epoch > imu.epoch
+        both_set = topic.clock.epoch > epoch and state.imu.clock.epoch > imu.epoch
         return _Missing.FOR_GOOD if both_set else _Missing.AS_YET
     return (left, right) if right.stamp - left.stamp <= state.gap else _Missing.FOR_GOOD
 

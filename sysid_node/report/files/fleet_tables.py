@@ -108,8 +108,9 @@ def _drift(summary: FleetSummary) -> Table:
     )  # fmt: skip
     rows: list[Row] = [
         (
-            d.aircraft, d.tail, d.name, d.kind, d.change, d.error, d.before, iso_date(d.since), iso_date(d.first),
-            iso_date(d.last), d.configuration, d.p_value, d.adjusted_p, str(d.significant).lower(),
+            d.aircraft, d.tail, d.name, d.course.kind, d.change, d.error, d.before,
+            *map(iso_date, (d.course.since, d.course.first, d.course.last)), d.course.configuration,
+            d.p_value, d.adjusted_p, str(d.significant).lower(),
         )
         for d in summary.drifts.values()
     ]  # fmt: skip

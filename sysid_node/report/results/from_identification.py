@@ -38,12 +38,14 @@ def identification_result(
     fit, first = found.fit, records[0]
     commanded = any(record.commanded for record in records)
     carried = carried_in_words(aircraft, settings.actuators, commanded)
-    trusted = "ok" if fit.converged else f"not converged: {fit.message}"
+    trusted = "ok" if fit.search.converged else f"not converged: {fit.search.message}"
     derivatives = {
         name: _derivative(name, fit.estimates.get(name), trusted, fit.remarks) for name in aircraft.derivatives
     }
-    servos = {name: _derivative(name, estimate, "ok", ()) for name, estimate in fit.servos.items()}
-    estimates = Estimates(sum(record.duration for record in records), derivatives, _fits(found), servos, fit.budget)
+    servos = {name: _derivative(name, estimate, "ok", ()) for name, estimate in fit.systematic.servos.items()}
+    estimates = Estimates(
+        sum(record.duration for record in records), derivatives, _fits(found), servos, fit.systematic.budget
+    )
     return RunResult(
         aircraft=aircraft.name,
         method=fit.method,
@@ -58,7 +60,7 @@ def identification_result(
         ),
         holdout=found.holdout,
         remarks=[
-            *(_sentence(remark) for remark in (fit.message, *fit.remarks, carried) if remark),
+            *(_sentence(remark) for remark in (fit.search.message, *fit.remarks, carried) if remark),
             *servo_remarks(aircraft, estimates),
             *(_limited(record, fault.text) for record in records for fault in rate_limits_of(aircraft, record)),
         ],

@@ -35,11 +35,11 @@ def change_words(drift: Drift) -> str:
 def drift_words(drift: Drift) -> str:
     """One drift: what, how much and since when."""
     what = f"{short_meaning(drift.name)} {change_words(drift)}"
-    if drift.kind == "configuration":
-        return f"{what} in the configuration {drift.configuration}"
-    if drift.kind == "trend":
-        return f"{what} little by little from {date_words(drift.first)} to {date_words(drift.last)}"
-    return f"{what} since {date_words(drift.since)}"
+    if drift.course.kind == "configuration":
+        return f"{what} in the configuration {drift.course.configuration}"
+    if drift.course.kind == "trend":
+        return f"{what} little by little from {date_words(drift.course.first)} to {date_words(drift.course.last)}"
+    return f"{what} since {date_words(drift.course.since)}"
 
 
 def tail_sentence(tail: str, drifts: Sequence[Drift], notes: Sequence[MaintenanceNote] = ()) -> str:
@@ -53,7 +53,7 @@ def tail_sentence(tail: str, drifts: Sequence[Drift], notes: Sequence[Maintenanc
 def _beside(note: MaintenanceNote, drift: Drift) -> bool:
     """Whether maintenance was within the dates between which a step lies (a day more on either side)."""
     day = note.date.timestamp() / DAY
-    return drift.kind == "step" and drift.first - 1.0 <= day <= drift.last + 1.0
+    return drift.course.kind == "step" and drift.course.first - 1.0 <= day <= drift.course.last + 1.0
 
 
 def _date_of(note: MaintenanceNote) -> str:

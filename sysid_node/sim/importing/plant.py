@@ -55,8 +55,17 @@ LoadFunction = Callable[[PlantStates], Array]
 
 
 @dataclass(frozen=True)
+class PlantEngine:
+    """The engine of another simulator's model, and the joint that carries the throttle."""
+
+    loads: LoadFunction
+    joint: str = "throttle"
+    full_thrust: float | None = None  # N, where thrust is proportional to the throttle
+
+
+@dataclass(frozen=True)
 class Plant:
-    """Another simulator's model. ``air`` and ``engine`` are its loads, SI, density kg/m^3."""
+    """Another simulator's model, SI; ``air`` are its aerodynamic loads at the air's ``density`` (kg/m^3)."""
 
     name: str
     source: str
@@ -66,11 +75,9 @@ class Plant:
     density: float
     controls: Mapping[str, Control]
     air: LoadFunction
-    engine: LoadFunction | None
+    engine: PlantEngine | None
     nodes: Mapping[str, Array]  # of alpha and beta, and where a model has kinks
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    throttle_joint: str = "throttle"
-    full_thrust: float | None = None  # N, where thrust is proportional to the throttle
 
 
 @dataclass(frozen=True)
@@ -93,8 +100,8 @@ def aircraft_of(plant: Plant, airspeed: float | None) -> tuple[Aircraft, LevelFl
     throttle = None
     if plant.engine is not None and size > 0.0 and level.throttle > 0.0:
         inclination = float(np.arctan2(-thrust[2], thrust[0]))
-        full = plant.full_thrust or size / level.throttle
-        throttle = Throttle(plant.throttle_joint, full, inclination, float(thrust[4]) / size)
+        full = plant.engine.full_thrust or size / level.throttle
+        throttle = Throttle(plant.engine.joint, full, inclination, float(thrust[4]) / size)
     steady = np.array([thrust[0], 0.0, thrust[2], 0.0, thrust[4], 0.0]) if throttle else np.zeros(6)
 
     def coefficients(points: Mapping[str, Array]) -> Array:
@@ -130,7 +137,7 @@ def nondimensional(load: Array, density: float, states: PlantStates, geometry: G
 
 
 def _engine(plant: Plant, states: PlantStates) -> Array:
-    return np.zeros((len(states.airspeed), 6)) if plant.engine is None else plant.engine(states)
+    return np.zeros((len(states.airspeed), 6)) if plant.engine is None else plant.engine.loads(states)
 
 
 def _states(plant: Plant, level: LevelFlight) -> PlantStates:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Control, Geometry, Inertia
 from sysid_node.errors import InputError
 from sysid_node.sim.importing.imported import Imported
-from sysid_node.sim.importing.plant import Plant, PlantStates, aircraft_of
+from sysid_node.sim.importing.plant import Plant, PlantEngine, PlantStates, aircraft_of
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def read_rosflight(path: Path, airspeed: float | None = None) -> Imported:
         density=model.density,
         controls=controls,
         air=model.air,
-        engine=model.engine if powered else None,
+        engine=PlantEngine(model.engine) if powered else None,
         nodes={"alpha": _ALPHA, "beta": _BETA},
         effects=effects,
     )

@@ -21,7 +21,7 @@ def test_standard_errors_are_those_of_the_information_for_white_residuals():
         np.testing.assert_allclose(estimate.standard_error, error, rtol=0.6)
         assert estimate.lower < estimate.value < estimate.upper
         assert estimate.status == "ok"
-    assert fit.converged
+    assert fit.search.converged
     assert fit.extras == {"sensor_q": 1.0}
     np.testing.assert_allclose(fit.log_det, 2.0 * np.sum(np.log(np.diag(noise))))
     np.testing.assert_allclose(list(fit.noise.values()), np.diag(noise))
@@ -34,6 +34,6 @@ def test_a_direction_without_effect_is_named():
     fit = assessed_fit("output_error", problem, problem.start(), 3, "not converged after 3 rounds")
     assert fit.estimates["Za"].status == "collinear with Zd"
     assert fit.estimates["Md"].status == "not excited"
-    assert not fit.converged
-    assert fit.message == "not converged after 3 rounds"
+    assert not fit.search.converged
+    assert fit.search.message == "not converged after 3 rounds"
     assert "nothing here shows Md" in fit.remarks

@@ -15,7 +15,7 @@ from sysid_node.errors import InputError
 def test_hfb_320_agrees_with_the_published_filter_error(flights):
     case = hfb_320(flights)
     fit = filter_error(case.model, [case.manoeuvre])
-    assert fit.converged
+    assert fit.search.converged
     for name, value in HFB_FILTER_ERROR.items():
         assert abs(fit.values[name] - value) < 2.0 * fit.estimates[name].standard_error, name
     assert np.exp(fit.log_det) < HFB_FILTER_ERROR_DET
@@ -27,7 +27,7 @@ def test_the_filter_and_the_truth_are_found():
     """The innovations show the noises by the gain alone, in which several mixtures of them are nearly the same."""
     model, manoeuvre = short_period_model(), in_gusts(np.random.default_rng(1), 40.0)
     fit = filter_error(model, [manoeuvre])
-    assert fit.converged
+    assert fit.search.converged
     found = [(e.value - SHORT_PERIOD[n]) / e.standard_error for n, e in fit.estimates.items()]
     assert np.abs(found).max() < 3.5
     noises = [fit.extras[f"{kind}_{name}"] for kind, names in _NOISES for name in names]

@@ -34,7 +34,7 @@ def scores(fit, truth=SHORT_PERIOD):
 def test_hfb_320_gives_jategaonkars_figures(flights):
     case = hfb_320(flights)
     fit = output_error(case.model, [case.manoeuvre])
-    assert fit.converged
+    assert fit.search.converged
     for name, (value, error) in HFB_OUTPUT_ERROR.items():
         assert abs(fit.values[name] - value) < 0.2 * error, name
         assert fit.estimates[name].white_error == pytest.approx(error, rel=0.05), name
@@ -44,7 +44,7 @@ def test_hfb_320_gives_jategaonkars_figures(flights):
 def test_attas_lateral_is_as_near_as_differentiated_rates_allow(flights):
     case = attas_lateral(flights)
     fit = output_error(case.model, [case.manoeuvre])
-    assert fit.converged
+    assert fit.search.converged
     for name, (value, _) in ATTAS_OUTPUT_ERROR.items():
         assert abs(fit.values[name] - value) < fit.estimates[name].standard_error, name
 
@@ -52,7 +52,7 @@ def test_attas_lateral_is_as_near_as_differentiated_rates_allow(flights):
 def test_twin_otter_gives_sidpacs_figures_and_coloured_errors(flights):
     case = twin_otter(flights)
     fit = output_error(case.model, [case.manoeuvre])
-    assert fit.converged
+    assert fit.search.converged
     for name, (value, error) in TWIN_OTTER_OUTPUT_ERROR.items():
         assert abs(fit.values[name] - value) < 0.2 * error, name
         assert fit.estimates[name].standard_error == pytest.approx(error, rel=0.1), name
@@ -64,7 +64,7 @@ def test_twin_otter_gives_sidpacs_figures_and_coloured_errors(flights):
 def test_exact_data_give_the_exact_truth():
     fit = output_error(short_period_model(WRONG_START), [flown(short_period_model())])
     np.testing.assert_allclose(list(fit.values.values()), list(SHORT_PERIOD.values()), rtol=1e-6)
-    assert fit.converged
+    assert fit.search.converged
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.2], ids=["white", "coloured"])
@@ -171,7 +171,7 @@ def test_gaps_in_an_output_count_as_not_measured():
     outputs[::2, 0] = np.nan  # a vane at half the rate
     outputs[200:240] = np.nan  # nothing at all for a while
     fit = output_error(short_period_model(WRONG_START), [with_outputs(manoeuvre, outputs)])
-    assert fit.converged
+    assert fit.search.converged
     assert np.abs(scores(fit)).max() < 3.5
     assert np.isfinite(fit.covariance).all()
 
@@ -235,8 +235,8 @@ def test_a_search_cut_short_says_so():
         [noisy(flown(short_period_model()), np.random.default_rng(10))],
         search=SearchOptions(rounds=1, evaluations=2),
     )
-    assert not fit.converged
-    assert "not converged after 1 rounds" in fit.message
+    assert not fit.search.converged
+    assert "not converged after 1 rounds" in fit.search.message
 
 
 def test_an_unknown_name_is_refused():

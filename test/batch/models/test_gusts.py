@@ -83,7 +83,7 @@ def test_without_gusts_nothing_changes():
 def test_filter_error_finds_the_truth_in_turbulence(turning):
     settings = BatchSettings(rate=50.0, segment=0.0, states=("V", "alpha", "q", "theta"))
     fit = identify("filter_error", KESTREL, [record(sortie(2, rotary_gusts=turning))], settings).fit
-    assert fit.converged
+    assert fit.search.converged
     for name, within in {"CL_alpha": 0.03, "Cm_q": 0.05, "Cm_de": 0.03, "Cm_alpha": 0.06}.items():
         assert fit.values[name] == pytest.approx(TRUTH[name], rel=within), name
         assert abs(fit.values[name] - TRUTH[name]) < 3.5 * fit.estimates[name].standard_error, name

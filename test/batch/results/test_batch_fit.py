@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sysid_node.batch.results.batch_fit import BatchFit, correlation_matrix
+from sysid_node.batch.results.batch_fit import BatchFit, SearchEnd, correlation_matrix
 from sysid_node.batch.results.estimate import ParameterEstimate
 
 
@@ -12,7 +12,7 @@ def test_values_and_correlations():
         name: ParameterEstimate(name, value, 1.0, 0.0, 0.0, True, "ok", 1.0)
         for name, value in (("Cm_q", -12.0), ("Cm_de", -1.2))
     }
-    fit = BatchFit("equation_error", estimates, covariance, {}, 0.0, [], True, 1, "")
+    fit = BatchFit("equation_error", estimates, covariance, {}, 0.0, [], SearchEnd(True, 1, ""))
     assert fit.values == {"Cm_q": -12.0, "Cm_de": -1.2}
     np.testing.assert_allclose(fit.correlation, [[1.0, -0.5], [-0.5, 1.0]])
 

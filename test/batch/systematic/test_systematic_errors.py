@@ -20,7 +20,7 @@ def found():
 
 
 def test_servos_that_the_file_does_not_know(found):
-    for name, servo in found.servos.items():
+    for name, servo in found.systematic.servos.items():
         assert servo.valid, name
         assert abs(servo.value - LATE) < 3.0 * servo.standard_error, name
 
@@ -53,7 +53,7 @@ def test_intervals_hold_steps_that_a_slow_log_tells_too_late():
 def test_parts_of_the_standard_error_and_the_budget(found):
     for name, e in found.estimates.items():
         assert e.standard_error == pytest.approx(np.hypot(e.statistical_error, e.systematic_error)), name
-        shares = found.budget[name]
+        shares = found.systematic.budget[name]
         assert list(shares.values()) == sorted(shares.values(), reverse=True)
         assert shares.get("statistical", 0.0) == pytest.approx((e.statistical_error / e.standard_error) ** 2, abs=0.006)
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx([e.standard_error for e in found.estimates.values()])
@@ -87,5 +87,5 @@ def test_an_exact_file_gives_the_method_alone():
     fit = identify("equation_error", KESTREL, [flight(1)], BatchSettings()).fit
     alone = equation_error(KESTREL, [flight(1)])
     assert fit.values == alone.values
-    assert not fit.servos
-    assert not fit.budget
+    assert not fit.systematic.servos
+    assert not fit.systematic.budget

@@ -22,9 +22,9 @@ def tail_of(values, error=0.01):
 def test_a_step_has_its_date_and_size():
     noise = 0.01 * np.random.default_rng(0).standard_normal(12)
     drift = find_drift(tail_of(0.2 + noise - 0.04 * (np.arange(12) >= 7)), 0.0, 100)
-    assert drift.kind == "step"
-    assert drift.since - FIRST_DAY == pytest.approx(70)
-    assert drift.first < drift.since <= drift.last
+    assert drift.course.kind == "step"
+    assert drift.course.since - FIRST_DAY == pytest.approx(70)
+    assert drift.course.first < drift.course.since <= drift.course.last
     assert drift.change == pytest.approx(-0.04, abs=3 * drift.error)
     assert drift.before == pytest.approx(0.2, abs=0.01)
     assert drift.p_value < 1e-4
@@ -33,7 +33,7 @@ def test_a_step_has_its_date_and_size():
 def test_a_trend_is_told_from_a_step():
     noise = 0.01 * np.random.default_rng(1).standard_normal(14)
     drift = find_drift(tail_of(0.2 + noise - np.linspace(0, 0.1, 14)), 0.0, 100)
-    assert drift.kind == "trend"
+    assert drift.course.kind == "trend"
     assert drift.change == pytest.approx(-0.1, abs=3 * drift.error)
 
 
@@ -63,7 +63,7 @@ def test_a_step_at_a_maintenance_needs_less_evidence():
     noise = 0.01 * np.random.default_rng(5).standard_normal(12)
     series = tail_of(0.2 + noise - 0.02 * (np.arange(12) >= 7))
     searched, known = find_drift(series, 0.0, 100), find_drift(series, 0.0, 100, [FIRST_DAY + 65])
-    assert known.since == searched.since == pytest.approx(FIRST_DAY + 70)
+    assert known.course.since == searched.course.since == pytest.approx(FIRST_DAY + 70)
     assert known.p_value < 0.5 * searched.p_value
 
 

@@ -234,7 +234,7 @@ def test_a_silent_topic_fills_no_memory_and_its_return_is_taken():
         f.imu(START + 10 * i * MS)
         f.joints(START + 10 * i * MS)
     waited = BUFFER_NS // (10 * MS)
-    assert len(f.state.waiting) == waited + 1
+    assert len(f.state.imu.waiting) == waited + 1
     assert len(f.state.actuators.entries) <= 2 * waited + 2
     assert f.rejected(IMU) == {gap(AIR_DATA): 2999 - waited - 1}
     f.all(START + 30_000 * MS)

@@ -55,17 +55,17 @@ def figure(report: FleetReport, drift: Drift, flights: dict[str, FlightResult]) 
         "error_y": {"type": "data", "array": packed(np.array(errors)), "thickness": 1.2, "width": 0, "color": BLUE},
         "marker": {"color": BLUE, "size": 6}, "hovertemplate": "%{x|%d %b %Y}: %{y:.4~g}",
     }  # fmt: skip
-    shape = "hv" if drift.kind == "step" else "linear"
+    shape = "hv" if drift.course.kind == "step" else "linear"
     course = {
-        "type": "scatter", "mode": "lines", "x": dates, "y": packed(drift.before + drift.change * drift.course),
+        "type": "scatter", "mode": "lines", "x": dates, "y": packed(drift.before + drift.change * drift.course.values),
         "name": "fitted", "line": {"color": VERMILION, "width": 1.6, "shape": shape},
         "hoverinfo": "skip",
     }  # fmt: skip
     shapes = [
         _vertical(iso_date(note.date.timestamp() / DAY)) for note in report.maintenance(drift.aircraft, drift.tail)
     ]
-    if drift.kind == "step":
-        shapes.append(_between(iso_date(drift.first), iso_date(drift.last)))
+    if drift.course.kind == "step":
+        shapes.append(_between(iso_date(drift.course.first), iso_date(drift.course.last)))
     layout = {
         "xaxis": axis("date", type="date", nticks=4),
         "yaxis": axis(drift.name),

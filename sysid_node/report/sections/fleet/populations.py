@@ -145,7 +145,7 @@ def _measured(report: FleetReport, population: Population) -> np.ndarray[Any, np
     for j, tail in enumerate(series.tails):
         drift = report.summary.drifts.get((series.aircraft, tail, series.name))
         if drift is not None and drift.significant:
-            values[series.tail == j] += drift.change * drift.course
+            values[series.tail == j] += drift.change * drift.course.values
     return values
 
 

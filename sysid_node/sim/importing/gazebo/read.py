@@ -18,7 +18,7 @@ from sysid_node.sim.importing.gazebo.controls import controls_of, joint_angles
 from sysid_node.sim.importing.gazebo.lift_drag import LiftDrag
 from sysid_node.sim.importing.gazebo.sdf import SdfModel, masses, number_in, read_sdf
 from sysid_node.sim.importing.imported import Imported
-from sysid_node.sim.importing.plant import Plant, PlantStates, aircraft_of, nondimensional
+from sysid_node.sim.importing.plant import Plant, PlantEngine, PlantStates, aircraft_of, nondimensional
 
 Array = NDArray[np.float64]
 
@@ -71,11 +71,9 @@ def read_gazebo(path: Path, airspeed: float | None = None) -> Imported:
         density=density,
         controls=controls,
         air=loads.air,
-        engine=loads.engine if loads.rotor else None,
+        engine=PlantEngine(loads.engine, loads.rotor.joint, loads.rotor.full_thrust) if loads.rotor else None,
         nodes=_nodes(simple, advanced),
         effects=_effects(model, controls, loads.rotor),
-        throttle_joint=loads.rotor.joint if loads.rotor else "throttle",
-        full_thrust=loads.rotor.full_thrust if loads.rotor else None,
     )
     aircraft, level = aircraft_of(plant, airspeed)
     return Imported(aircraft, tuple(_notes(model, loads, level.throttle, bool(simple), bool(advanced))))
