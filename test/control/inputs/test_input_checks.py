@@ -31,7 +31,9 @@ def test_after_nonsense_the_command_is_soon_that_of_level_flight(
         command = controller.step(state, Measurements(k * STEP, *sensed), SetPoints(), excitation)
         assert np.isfinite(command).all()
         assert (np.abs(command[:3]) <= LIMITS + 1e-12).all()
-        assert (np.abs(state.law.surfaces.by_feedback) <= 2.0 * LIMITS).all(), "a surface cannot carry more than it can move"
+        assert (np.abs(state.law.surfaces.by_feedback) <= 2.0 * LIMITS).all(), (
+            "a surface cannot carry more than it can move"
+        )
     for k in range(10, 60):
         command = controller.step(state, level(k * STEP), SetPoints())
     np.testing.assert_allclose(command[:3], trim[:3], atol=0.12)
