@@ -19,6 +19,34 @@ DEFAULTS = Path(get_package_share_directory("sysid_node"), "config", "identifier
 TOPICS = {"imu": "imu/data", "air_data": "air_data", "actuators": "actuators"}
 
 
+def arguments() -> list[DeclareLaunchArgument]:
+    """What may be given on the command line."""
+    return [
+        DeclareLaunchArgument("aircraft", description="a name in config/aircraft, or an aircraft file"),
+        DeclareLaunchArgument("parameters", default_value=str(DEFAULTS), description="parameter file"),
+        DeclareLaunchArgument("namespace", default_value="", description="namespace of nodes and topics"),
+        DeclareLaunchArgument(
+            "use_sim_time",
+            default_value="false",
+            description="true: the time of /clock, as beside a simulator or a player with --clock",
+            choices=["true", "false"],
+        ),
+        DeclareLaunchArgument(
+            "autopilot",
+            default_value="",
+            description="whose topics the adapter translates; empty: no adapter",
+            choices=["", "px4", "mavros", "rosflight"],
+        ),
+        DeclareLaunchArgument(
+            "joints", default_value="", description="of the adapter: NAME=OUTPUT:TRIM:SCALE with spaces between"
+        ),
+        *(
+            DeclareLaunchArgument(name, default_value=topic, description=f"the autopilot's topic for {topic}")
+            for name, topic in TOPICS.items()
+        ),
+    ]
+
+
 def generate_launch_description() -> LaunchDescription:
     """The node, its parameters from a file, the aircraft given on top, its topics as the autopilot names them."""
     argument, value = LaunchConfiguration, ParameterValue
@@ -26,28 +54,7 @@ def generate_launch_description() -> LaunchDescription:
     autopilot, joints = (value(argument(name), value_type=str) for name in ("autopilot", "joints"))
     return LaunchDescription(
         [
-            DeclareLaunchArgument("aircraft", description="a name in config/aircraft, or an aircraft file"),
-            DeclareLaunchArgument("parameters", default_value=str(DEFAULTS), description="parameter file"),
-            DeclareLaunchArgument("namespace", default_value="", description="namespace of nodes and topics"),
-            DeclareLaunchArgument(
-                "use_sim_time",
-                default_value="false",
-                description="true: the time of /clock, as beside a simulator or a player with --clock",
-                choices=["true", "false"],
-            ),
-            DeclareLaunchArgument(
-                "autopilot",
-                default_value="",
-                description="whose topics the adapter translates; empty: no adapter",
-                choices=["", "px4", "mavros", "rosflight"],
-            ),
-            DeclareLaunchArgument(
-                "joints", default_value="", description="of the adapter: NAME=OUTPUT:TRIM:SCALE with spaces between"
-            ),
-            *(
-                DeclareLaunchArgument(name, default_value=topic, description=f"the autopilot's topic for {topic}")
-                for name, topic in TOPICS.items()
-            ),
+            *arguments(),
             LifecycleNode(
                 package="sysid_node",
                 executable="identifier",

@@ -25,11 +25,6 @@ class DocumentEntry:
         """Whether the value is a mapping."""
         return isinstance(self.node, yaml.MappingNode)
 
-    @property
-    def is_list(self) -> bool:
-        """Whether the value is a list."""
-        return isinstance(self.node, yaml.SequenceNode)
-
     def truth(self, expected: str) -> bool:
         """The value as true or false."""
         word = str(self.node.value).lower() if self._is_plain() else ""

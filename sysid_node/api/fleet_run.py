@@ -80,14 +80,19 @@ def run_fleet(
                 with workers.opened() as opened:
                     say(opened.client.dashboard_link)
                     work_through(plan, state, out, opened, estimate_flight, limits, tell)
-            results = assembled(plan, state)
-            loaded = (plan.aircraft_of(flight) for flight in catalogue.flights)
-            files = {aircraft.name: aircraft for aircraft in loaded if aircraft is not None}
-            found = FleetReport(results, summarise(results, files), files)
+            found = _report(plan, state, catalogue)
             folder.publish(lambda place: write_results(place, found, settings))
         finally:
             state.close()
     return found
+
+
+def _report(plan: Plan, state: FleetState, catalogue: Catalogue) -> FleetReport:
+    """What all flights that are done tell together."""
+    results = assembled(plan, state)
+    loaded = (plan.aircraft_of(flight) for flight in catalogue.flights)
+    files = {aircraft.name: aircraft for aircraft in loaded if aircraft is not None}
+    return FleetReport(results, summarise(results, files), files)
 
 
 @contextmanager

@@ -117,9 +117,9 @@ def diagnose(
 
     The gap is measured on ``holdout``; without it, on parts of the flights that were not fitted. ``simulated`` are
     flights recorded in a simulator of any kind: it is identified from them, the aircraft file being a first guess, and
-    the flights are held against it instead. ``resume``: a folder
-    for finished steps, from which an interrupted diagnosis goes on. ``progress`` is called with the share done (0..1)
-    and what is being done. A diagnosis takes about a minute for a minute of flight. ``simulator``: ``jsbsim:NAME`` or
+    the flights are held against it instead. ``resume``: a folder for finished steps, from which an interrupted
+    diagnosis goes on. ``progress`` is called with the share done (0..1) and what is being done. A diagnosis takes about
+    a minute for a minute of flight. ``simulator``: ``jsbsim:NAME`` or
     ``jsbsim:FILE``, a model of the same aircraft; the correction is written into a copy of it, and both fly there.
 
     Raises InputError where the aircraft file has no tolerances, a flight cannot be read, is fitted and held out at
@@ -129,11 +129,9 @@ def diagnose(
     flights = [flights] if isinstance(flights, FlightFile) else list(flights)
     if not flights:
         raise InputError("no flight to diagnose; give at least one")
-    aircraft = flights[0].aircraft
     if simulator is not None and simulated:
-        raise InputError(
-            "simulator and simulated: both are given; give the simulator's model, or flights recorded in it"
-        )
+        raise InputError("simulator and simulated: both are given; give the model, or flights recorded in it")
+    aircraft = flights[0].aircraft
     theirs = None if simulator is None else user_simulator(simulator, aircraft)
     fitted, held_out, of_simulator = (
         [load_gap_flight(f.path, aircraft, f.topics, f.body_frame) for f in group]

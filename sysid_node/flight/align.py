@@ -162,7 +162,6 @@ def align(
     air = screen_air_data(aircraft, streams.air_data)
     thrust_and_controls, faults = Actuation.of(aircraft).of_array(streams.actuators.names, streams.actuators.positions)
     actuators = screen(streams.actuators.arrival, thrust_and_controls, faults)
-
     at = imu.stamps
     late = at < at[-1] - buffer_ns(max_gap) if at.size else np.empty(0, bool)
     right_air, near_air, wait_air = bracket(air.stamps, at, max_gap)
@@ -176,10 +175,8 @@ def align(
     of_air = interpolate(air.stamps, air.values, right_air[used], at[used])
     every = intervals(air.stamps, max_gap)[right_air[used]]
     samples = np.column_stack([imu.values[used], of_air, actuated[:, :1], every, actuated[:, 1:]])
-    gaps = {
-        gap(AIR_DATA): int(np.count_nonzero(decided & ~near_air)),
-        gap(ACTUATORS): int(np.count_nonzero(decided & near_air & ~near_act)),
-    }
+    missing = {AIR_DATA: decided & ~near_air, ACTUATORS: decided & near_air & ~near_act}
+    gaps = {gap(topic): int(np.count_nonzero(where)) for topic, where in missing.items()}
     rejected = _rejected(imu, air, actuators, gaps)
     return Alignment(imu, (air, actuators), (right_air, right_act), used, samples, rejected, commands_from)
 

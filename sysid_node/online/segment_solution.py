@@ -160,10 +160,6 @@ def solve_all(
         yield
     systematic = yield from _systematic(state, signals, found, before.solution, at[1] if at else None)
     yield
-    variance = found.inflation[:, None] * spread.covariance.diagonal(axis1=1, axis2=2)
-    if systematic is not None:
-        variance = variance * systematic.considered.misfit[:, None]
-    scale = before.solution.residual[:, None] * np.abs(before.solution.inverse.diagonal())
     state.latest = SegmentSolution(
         time=now,
         pieces=state.finished.pieces,
@@ -174,13 +170,22 @@ def solve_all(
         later=LaterEstimates(
             found.compensation,
             trim_noise=spread.bands[:, 0] * total.energy,
-            factors=np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0),
+            factors=_variance_factors(found, before.solution, systematic),
         ),
         instruments=found.instruments,
         tests=_model_tests(state, found.solution, spread, gram, systematic),
         systematic=systematic,
     )
     state.changes.monitor.references.append(before)
+
+
+def _variance_factors(found: _SolvedEquations, recorded: Solution, systematic: SystematicErrors | None) -> Array:
+    """(C, P) variances over those that the ``recorded`` signals' solution has by its residual alone."""
+    variance = found.inflation[:, None] * found.spread.covariance.diagonal(axis1=1, axis2=2)
+    if systematic is not None:
+        variance = variance * systematic.considered.misfit[:, None]
+    scale = recorded.residual[:, None] * np.abs(recorded.inverse.diagonal())
+    return np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
 
 
 def _with_recorded_signals(

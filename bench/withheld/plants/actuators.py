@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from bench.withheld.plants.motion import Effects
 
@@ -84,9 +84,3 @@ def _of(effects: Effects, effect: str, key: str, control: str, absent: float) ->
 def servo_lag(servo: float) -> float:
     """The first-order lag (s) that a servo of this frequency looks like: 2 * 0.7 / omega."""
     return 1.4 / (2.0 * math.pi * servo)
-
-
-def late_by(servo: float, effects: Effects, names: Sequence[str]) -> float:
-    """Seconds by which a surface is late in all, as far as lags and delays of these effects make it."""
-    keys = {"command_delay": "delay", "actuator_lag": "time_constant", "actuator_stamp_delay": "delay"}
-    return servo_lag(servo) + sum(effects[n][keys[n]] for n in names if n in effects and n in keys)

@@ -120,6 +120,17 @@ def _expected_differences(aircraft: Aircraft) -> dict[str, float]:
     return {name: THRESHOLDS.priors.reality * abs(d.value) for name, d in aircraft.derivatives.items()}
 
 
+def _required_tolerances(aircraft: Aircraft) -> dict[str, float]:
+    """The same; raises InputError where there are none."""
+    tolerances = derivative_tolerances(aircraft)
+    if not tolerances:
+        raise InputError(
+            f"aircraft {aircraft.name!r}: no derivative has a tolerance, so what is a gap cannot be told from an "
+            "honest error; give derivatives a tolerance (1 sigma) in the aircraft file"
+        )
+    return tolerances
+
+
 def nuisances_of(
     aircraft: Aircraft,
     model: ResidualModel,
@@ -134,12 +145,7 @@ def nuisances_of(
     where the aircraft file has no tolerances and is no simulator's.
     """
     models = (model, *others)
-    tolerances = derivative_tolerances(aircraft)
-    if not tolerances:
-        raise InputError(
-            f"aircraft {aircraft.name!r}: no derivative has a tolerance, so what is a gap cannot be told from an "
-            "honest error; give derivatives a tolerance (1 sigma) in the aircraft file"
-        )
+    tolerances = _required_tolerances(aircraft)
     lateral = any(m.flight.lateral for m in models)
     sigma = {f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in LATERAL}
     believed = believed_effects(model.simulator)

@@ -39,11 +39,7 @@ def save_estimates(
         "samples": samples,
         "rejected": rejected,
         "settings": settings.as_dict(),
-        "derivatives": {name: _plain(d._asdict(), without="name") for name, d in estimates.derivatives.items()},
-        "fits": {name: _plain(f._asdict(), without="coefficient") for name, f in estimates.fits.items()},
-        "servos": {name: _plain(d._asdict(), without="name") for name, d in estimates.servos.items()},
-        "budget": {name: dict(shares) for name, shares in estimates.budget.items()},
-        "holdout": {},
+        **_findings(estimates),
     }
     folder = folder.absolute()
     path = folder / f"{_file_name(aircraft)}-{stamp_ns}.json"
@@ -55,6 +51,17 @@ def save_estimates(
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); set the parameter save_directory") from None
     return path
+
+
+def _findings(estimates: Estimates) -> dict[str, object]:
+    """What was estimated, as ``summary.json`` has it."""
+    return {
+        "derivatives": {name: _plain(d._asdict(), without="name") for name, d in estimates.derivatives.items()},
+        "fits": {name: _plain(f._asdict(), without="coefficient") for name, f in estimates.fits.items()},
+        "servos": {name: _plain(d._asdict(), without="name") for name, d in estimates.servos.items()},
+        "budget": {name: dict(shares) for name, shares in estimates.budget.items()},
+        "holdout": {},
+    }
 
 
 def _file_name(name: str) -> str:

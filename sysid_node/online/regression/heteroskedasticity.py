@@ -67,11 +67,8 @@ def measure(
     structure = equations.structure
     x = rows[:, equations.columns] - mean[equations.columns]
     relative = 2.0 * aircraft.noise["airspeed"] / aircraft.reference.airspeed
-    w, alpha_weighted, accelerometer_power = (
-        (relative * (x @ theta)) ** 2,
-        np.zeros((len(rows), theta.shape[1])),
-        np.zeros(theta.shape[1]),
-    )
+    w = (relative * (x @ theta)) ** 2
+    alpha_weighted, accelerometer_power = np.zeros((len(rows), theta.shape[1])), np.zeros(theta.shape[1])
     step = duration / len(rows)
     if "CD" in structure.coefficients and "alpha" in layout.names:
         c = structure.coefficients.index("CD")

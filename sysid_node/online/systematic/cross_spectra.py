@@ -20,8 +20,6 @@ from sysid_node.online.regression.instruments import InstrumentModel
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-NO_SPECTRA: Complex = np.zeros((0, 0, 0), dtype=complex)
-
 
 def cross_spectra(clean: Array) -> Complex:
     """(F, T, T) of the clean lines (2F, T) of a segment, whose controls are where the servos have them."""

@@ -79,20 +79,8 @@ def imperfections(
     found = sources(aircraft)
     unseen = _time_of_steps(command_interval) if commanded else 0.0
     servos = dict(zip(aircraft.control_symbols, servos_of(aircraft)[1:], strict=True))
-    names = {control.symbol: name for name, control in aircraft.controls.items()}
     stated = [servo_model.of_servo(servos[symbol]) for symbol in layout.timed]
-    rows: list[tuple[str, int, float, float]] = []
-    unknown = []
-    for place, symbol in enumerate(layout.timed):
-        name = names[symbol]
-        sigma = math.hypot(*(aircraft.tolerances.get(f"{effect}.{name}", 0.0) for effect in _SERVO_EFFECTS))
-        if not commanded:
-            sigma = math.hypot(sigma, stated[place][0])
-        if math.hypot(sigma, unseen) > 0.0 and not positions:
-            if commanded and stated[place][0] == 0.0 and sigma > KNOWN:
-                unknown.append(len(rows))
-            mean, spread = _later(stated[place][0], sigma) if commanded else (0.0, sigma)
-            rows.append((name, place, mean, math.hypot(spread, unseen)))
+    rows, unknown = ([], []) if positions else _uncertain_servos(aircraft, layout, stated, unseen, commanded=commanded)
     if not found and not rows:
         return None
     columns = ServoColumns.of(layout)
@@ -112,6 +100,35 @@ def imperfections(
         unseen,
         np.array([columns.place(i) for i in range(layout.width)], np.intp),
     )
+
+
+def _uncertain_servos(
+    aircraft: Aircraft,
+    layout: SignalLayout,
+    stated: list[tuple[float, float, float]],
+    unseen: float,
+    *,
+    commanded: bool,
+) -> tuple[list[tuple[str, int, float, float]], list[int]]:
+    """Of each servo that is not exactly known its name, place, expected lateness and 1 sigma (s) beyond the file's.
+
+    Behind them the places, among these, of the servos of which the file is silent. ``unseen`` (s): 1 sigma of the time
+    of steps.
+    """
+    names = {control.symbol: name for name, control in aircraft.controls.items()}
+    rows: list[tuple[str, int, float, float]] = []
+    unknown = []
+    for place, symbol in enumerate(layout.timed):
+        name = names[symbol]
+        sigma = math.hypot(*(aircraft.tolerances.get(f"{effect}.{name}", 0.0) for effect in _SERVO_EFFECTS))
+        if not commanded:
+            sigma = math.hypot(sigma, stated[place][0])
+        if math.hypot(sigma, unseen) > 0.0:
+            if commanded and stated[place][0] == 0.0 and sigma > KNOWN:
+                unknown.append(len(rows))
+            mean, spread = _later(stated[place][0], sigma) if commanded else (0.0, sigma)
+            rows.append((name, place, mean, math.hypot(spread, unseen)))
+    return rows, unknown
 
 
 def _later(stated: float, sigma: float) -> tuple[float, float]:

@@ -35,14 +35,3 @@ def parse_xml(path: Path, *, comments: bool = False) -> Element:
     except ElementTree.ParseError as error:
         line, column = error.position
         raise InputError(f"{path}:{line}: not XML (column {column}); give the model's file") from error
-
-
-def number_of(element: Element, file: str) -> float:
-    """The element's text as a finite number. Raises InputError with its tag."""
-    try:
-        value = float((element.text or "").strip())
-    except ValueError:
-        value = float("nan")
-    if not -1e300 < value < 1e300:
-        raise InputError(f"{file}: {element.tag}: got {(element.text or '').strip()!r}, expected a number")
-    return value

@@ -170,18 +170,22 @@ def _notes(
     if left:
         notes.append(f"Terms of {', '.join(left)} in the rate of alpha are left out; a file has those of CL and Cm.")
     if program.powered:
-        notes.append(
-            f"Thrust is {model.thrust:.0f} N at throttle {steady.state.throttle:.2f} and {steady.state.airspeed:.1f} "
-            "m/s"
-            + (f", with a lag of {model.motor_lag:.2f} s" if model.motor_lag else "")
-            + (f" after a delay of {model.throttle_delay:.2f} s" if model.throttle_delay else "")
-            + "; how it changes with airspeed, and how it differs from one in proportion to the throttle, is in the "
-            "tables over V and throttle."
-        )
+        notes.append(_thrust_note(steady, model))
     notes.append(
         "The IMU's place is the model's eye point, the pilot's; flow angles are those at the centre of gravity."
     )
     return notes
+
+
+def _thrust_note(steady: SteadyFlight, model: CoefficientModel) -> str:
+    """How the thrust follows the throttle."""
+    return (
+        f"Thrust is {model.thrust:.0f} N at throttle {steady.state.throttle:.2f} and {steady.state.airspeed:.1f} m/s"
+        + (f", with a lag of {model.motor_lag:.2f} s" if model.motor_lag else "")
+        + (f" after a delay of {model.throttle_delay:.2f} s" if model.throttle_delay else "")
+        + "; how it changes with airspeed, and how it differs from one in proportion to the throttle, is in the "
+        "tables over V and throttle."
+    )
 
 
 def _remainder(model: CoefficientModel, expansion: Expansion, axes: Mapping[str, TableAxis]) -> list[str]:
