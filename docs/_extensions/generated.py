@@ -94,16 +94,16 @@ def _words(action: argparse.Action) -> str:
     if isinstance(shown, tuple):
         shown = " ".join(shown)
     value = "" if action.nargs == 0 else shown or "CHOICE"
-    if not action.option_strings:
-        return f"`{value or action.dest}`"
-    return f"`{', '.join(action.option_strings)}{' ' + value if value else ''}`".replace("|", "\\|")
+    names = ", ".join(action.option_strings)
+    words = f"{names}{' ' + value if value else ''}" if names else value or action.dest
+    return f"`{words}`".replace("|", "\\|")
 
 
 def _default(action: argparse.Action) -> str:
     if action.required and action.option_strings:
         return "needed"
     switch = isinstance(action, argparse._StoreConstAction)  # it is given or not: it has no value to fall back on
-    if switch or action.default in (None, argparse.SUPPRESS, []) or not action.option_strings:
+    if switch or action.default in (None, argparse.SUPPRESS, [], "") or not action.option_strings:
         return ""
     return f"`{action.default}`"
 
@@ -255,9 +255,8 @@ def source_map() -> str:
 def _first_sentence(path: Path) -> str:
     said = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
     paragraph = re.sub(r"^(Layer `\w+`|sysid): ", "", " ".join(said.split("\n\n")[0].split()).replace("``", "`"))
-    ends = r"(?<=\.)\s" if path.stem == "__init__" else r"(?<=[.:;])\s"  # a package's sentence lists what is inside
-    sentence = re.split(ends, paragraph, maxsplit=1)[0].rstrip(":;.")
-    return sentence[:1].upper() + sentence[1:] + ("." if sentence else "")
+    sentence = re.split(r"(?<=[.?])\s(?=[A-Z`])", paragraph, maxsplit=1)[0].rstrip(":;.")  # not after "sec."
+    return sentence[:1].upper() + sentence[1:] + ("" if sentence.endswith("?") or not sentence else ".")
 
 
 def _dotted(path: Path) -> str:
