@@ -1,10 +1,10 @@
 """Adapts the gains of an axis to new estimates, within gain and phase margins and at a bounded rate.
 
 An estimate is used where it is valid, its interval is narrow and R^2 of its equation is large; the other derivatives
-keep their values. The new gains are flown only if the loop is stable with margins at every point of the used
-estimates' confidence region (``confidence_region``). Otherwise gains of a regulator with a larger weight on the
-surfaces are tried, and else the old gains are kept. A few points are checked at each step, so that no command is
-delayed. Gains and derivatives then move to the new values on a straight line at a bounded rate.
+keep their values. The new gains are flown only if the loop keeps margins, and farther away stability, wherever the used
+estimates may be (``confidence_region``). Otherwise gains of a regulator with a larger weight on the surfaces are tried,
+and else the old gains are kept. A few points are checked at each step, so that no command is delayed. Gains and
+derivatives then move to the new values on a straight line at a bounded rate.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.control.design.axis import ControlAxis
-from sysid_node.control.design.confidence_region import region_points
-from sysid_node.control.design.margins import margins
+from sysid_node.control.design.confidence_region import RegionPoints, region_points
+from sysid_node.control.design.margins import margins, stable
 from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import ErrorCorrelation, IdentifiedDerivative
 
@@ -53,10 +53,10 @@ class AxisParameters(NamedTuple):
 
 @dataclass
 class MarginCheck:
-    """Gains whose margins are being checked at N points of the confidence region, ``passed`` of which are done."""
+    """Gains that are being checked at the points of the confidence region, ``passed`` of which are done."""
 
     values: Array  # (D,)
-    points: Array  # (N, D)
+    points: RegionPoints
     gains: Array
     passed: int = 0
     caution: int = 0  # place in ``CAUTIONS``
@@ -177,11 +177,13 @@ def _among(axis: ControlAxis, used: Sequence[str], correlation: ErrorCorrelation
 
 def _check_points(state: AxisAdaptation, check: MarginCheck, settings: ControllerSettings) -> None:
     """Check the next few points."""
-    points = check.points[check.passed : check.passed + A_STEP]
-    if not _have_margins(state.axis, points, check.gains, settings):
+    near = check.passed < check.points.margins
+    end = min(check.passed + A_STEP, check.points.margins if near else len(check.points))
+    points = check.points.values[check.passed : end]
+    if not (_have_margins if near else _are_stable)(state.axis, points, check.gains, settings):
         _raise_caution(state, check)
         return
-    check.passed += len(points)
+    check.passed = end
     if check.passed == len(check.points):
         state.target, state.check = AxisParameters(check.values, check.gains), None
         state.accepted += 1
@@ -194,6 +196,10 @@ def _have_margins(axis: ControlAxis, points: Array, gains: Array, settings: Cont
         return False
     found = margins(axis.model(points), gains, axis.delay)
     return bool(found.enough(settings.gain_margin, settings.phase_margin).all())
+
+
+def _are_stable(axis: ControlAxis, points: Array, gains: Array, _: ControllerSettings) -> bool:
+    return bool(stable(axis.model(points), gains, axis.delay).all())
 
 
 def _raise_caution(state: AxisAdaptation, check: MarginCheck) -> None:
