@@ -30,7 +30,7 @@ TYPES = ("cdrw", "kestrel")
 NAMES = ("CL_0", "CL_alpha", "Cm_0", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_dr")
 START = datetime.datetime(2026, 1, 1, tzinfo=datetime.UTC)
 TAIL_SCATTER, FLIGHT_SCATTER, STATISTICAL, SYSTEMATIC = 0.04, 0.015, 0.03, 0.02  # of the derivative's size
-WEAR, VANE, LAG, MOTOR = -0.18, 0.02, 0.08, 0.25  # share of aileron power; rad; s; s
+WEAR, VANE, LAG, MOTOR = 0.18, 0.02, 0.08, 0.25  # share of aileron power; rad; s; s
 LACKING, SLOW, VANE_CAUSE = "motor_lag", "actuator_lag of elevator", "vane_bias"
 CONFUSED = {SLOW: "command_delay of elevator", LACKING: "thrust_scale"}
 FALSE = ("imu_scale", "cg_shift", "airspeed_scale", "propwash", "stall_separation", "structural_mode")
@@ -45,6 +45,7 @@ class Truth:
     flight_scatter: Mapping[tuple[str, str], float]
     tails: Mapping[tuple[str, str, str], float]
     worn: str = ""
+    wear: float = 0.0  # share of its aileron power that the worn tail loses over the year
     slow: str = ""
     vane: str = ""
     since: float = 0.0  # day of the maintenance, of the year
@@ -53,16 +54,16 @@ class Truth:
 
 
 def draw_fleet(
-    seed: int, *, events: bool = True, tails: int = 10, types: Sequence[str] = TYPES
+    seed: int, *, events: bool = True, tails: int = 10, types: Sequence[str] = TYPES, wear: float = WEAR
 ) -> tuple[FleetResults, Truth]:
-    """A fleet and its truth."""
+    """A fleet and its truth; ``wear`` is the share of its aileron power that the worn tail loses over the year."""
     generator = np.random.default_rng([seed, 24])
     files = {name: load_aircraft(name) for name in types}
     names = {(aircraft, j): f"{aircraft}-{j + 1:02d}" for aircraft in types for j in range(tails)}
     worn, slow, vane = generator.choice(sorted(names.values()), 3, replace=False) if events else ("", "", "")
     since = float(generator.uniform(120, 240))
     flights: list[FlightResult] = []
-    truth = Truth({}, {}, {}, {}, str(worn), str(slow), str(vane), since, _drifting(str(worn), str(vane)), {})
+    truth = Truth({}, {}, {}, {}, str(worn), wear, str(slow), str(vane), since, _drifting(str(worn), str(vane)), {})
     for aircraft, file in files.items():
         flights += _fly_type(generator, aircraft, file, tails, truth, events)
     notes = [MaintenanceNote(str(vane), _date(since), "nose boom replaced")] if events else []
@@ -113,7 +114,7 @@ def _changes(file: Aircraft, tail: str, truth: Truth, day: float) -> Array:
     """What wear and a mis-set vane add to a tail's derivatives (n,) on a day."""
     change = dict.fromkeys(NAMES, 0.0)
     if tail == truth.worn:
-        change["Cl_da"] = WEAR * file.derivatives["Cl_da"].value * day / 365
+        change["Cl_da"] = -truth.wear * file.derivatives["Cl_da"].value * day / 365
     if tail == truth.vane and day >= truth.since:
         change["CL_0"] = -VANE * file.derivatives["CL_alpha"].value
         change["Cm_0"] = -VANE * file.derivatives["Cm_alpha"].value

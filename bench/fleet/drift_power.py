@@ -29,9 +29,10 @@ TAILS, TESTS, CALLED = 10, 200, 3
 LIMIT = FALSE_RATE * CALLED / TESTS
 #: What happens to the first tail: its course over days (n,), given the day of something that is done to it.
 CASES: dict[str, tuple[Callable[[Array, float], Array], bool]] = {
-    "loses 18 % little by little over the year": (lambda day, _: WEAR * day / 365, False),
+    "loses 18 % little by little over the year": (lambda day, _: -WEAR * day / 365, False),
     "loses 20 % little by little": (lambda day, _: -0.20 * day / 365, False),
     "loses 22 % little by little": (lambda day, _: -0.22 * day / 365, False),
+    "loses 25 % little by little": (lambda day, _: -0.25 * day / 365, False),
     "loses 15 % on a day": (lambda day, since: -0.15 * (day >= since), False),
     "loses 15 % on a day, with a maintenance note": (lambda day, since: -0.15 * (day >= since), True),
 }

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.withheld.plants.instruments import SUITES
+from bench.withheld.plants.instruments import USUAL
+from bench.withheld.plants.sizes import SIZES, chord, slower
 
-SETS = {"development": 20260101, "final": 20260401}
+SETS = {"development": 20260101, "final": 20260401, "sizes_development": 20261101, "sizes": 20261125}
 PLANTS = {"cdfp": 0.25, "cdrw": 0.25, "kestrel": 0.25, "c172p": 0.25}  # the last flies in JSBSim
+#: Plants of the two sets of other sizes, and the instruments that each may have.
+SIZED = dict.fromkeys(SIZES, 1.0 / len(SIZES))
+SUITES_OF = {"foamie": ("fast", "small"), "transport": ("fifty", "slow", "ten")}
 FOREIGN = "c172p"  # whose tables no aircraft file holds
 KINDS = {"none": 0.2, "one": 0.5, "two": 0.15, "unlisted": 0.15}
 TURBULENCE = {"none": 0.4, "light": 0.4, "moderate": 0.2}
@@ -125,12 +129,13 @@ class Case:
 def draw(which: str, seed: int, attempt: int = 0) -> Case:
     """A case of a set. A later attempt draws the sizes anew, all else alike."""
     random = np.random.default_rng([SETS[which], seed])
-    plant, kind, turbulence = (_one(random, table) for table in (PLANTS, KINDS, TURBULENCE))
+    plants = SIZED if which.startswith("sizes") else PLANTS
+    plant, kind, turbulence = (_one(random, table) for table in (plants, KINDS, TURBULENCE))
     names = _names(random, kind, plant)
     programme = str(random.choice(["steps", "doublets", "mixed", "multisine"], p=[0.4, 0.2, 0.25, 0.15]))
     manoeuvres = tuple(programme_of(programme, plant, random) for _ in range(2))
-    suite, noise = str(random.choice(list(SUITES))), float(random.uniform(0.7, 1.3))
-    servo, bandwidth = float(random.uniform(25.0, 40.0)), float(random.uniform(0.8, 1.8))
+    suite, noise = str(random.choice(SUITES_OF.get(plant, USUAL))), float(random.uniform(0.7, 1.3))
+    servo, bandwidth = float(random.uniform(25.0, 40.0)), float(random.uniform(0.8, 1.8)) / _slowness(plant)
     sizes = np.random.default_rng([SETS[which], seed, attempt])
     effects = {name: _sized(name, plant, sizes, min(1.0 + 0.15 * attempt, 2.0)) for name in names}
     return Case(seed, plant, kind, effects, manoeuvres, programme, turbulence, suite, noise, servo, bandwidth)  # type: ignore[arg-type]
@@ -157,9 +162,11 @@ def _sized(name: str, plant: str, random: np.random.Generator, more: float) -> V
         value = float(random.uniform(low, high)) * (more if key not in ("onset", "alpha_star", "frequency") else 1.0)
         values[key] = value * (float(random.choice([-1.0, 1.0])) if key in size.either else 1.0)
     if size.metres:
-        values = {key: value * CHORDS[plant] for key, value in values.items()}
+        values = {key: value * _length(plant) for key, value in values.items()}
+    powers = dict.fromkeys("pqr", -1) if name == "imu_bias" else _POWER_OF_TIME
+    values = {key: value * _slowness(plant) ** powers.get(key, 0) for key, value in values.items()}
     if name == "control_effectiveness_loss":
-        values["onset"] = float(random.choice([-10.0, random.uniform(*_ONSET)]))
+        values["onset"] = float(random.choice([-10.0, random.uniform(*_ONSET) * _spread(plant)]))
         values = {k: min(v, 0.85) if k != "onset" else v for k, v in values.items()}
     if name == "thrust_scale":  # an engine that gives next to nothing is no scale error
         values = {k: float(np.clip(v, -0.6, 0.8)) for k, v in values.items()}
@@ -171,17 +178,40 @@ def _sized(name: str, plant: str, random: np.random.Generator, more: float) -> V
 #: Lengths by which lever arms are scaled, m: about the mean chord, not more than half a metre for a delta.
 CHORDS = {"cdfp": 0.4, "cdrw": 0.4, "kestrel": 0.25, "c172p": 1.5}
 
+#: Power of time in the unit of a parameter: a size whose motions are slower has longer delays and smaller rates.
+_POWER_OF_TIME = {"delay": 1, "time_constant": 1, "seconds": 1, "rate": -1, "frequency": -1}
+
 _AMPLITUDE = {"elevator": 0.06, "aileron": 0.06, "rudder": 0.1}
+
+
+def _length(plant: str) -> float:
+    return chord(plant) if plant in SIZES else CHORDS[plant]
+
+
+def _slowness(plant: str) -> float:
+    """How many times as slow as those of a small aircraft the motions of a size are."""
+    return slower(plant) if plant in SIZES else 1.0
+
+
+def _spread(plant: str) -> float:
+    """How many times as long as usual the flights are: in a large aircraft the manoeuvres need it."""
+    return max(_slowness(plant) / 1.6, 1.0)
+
+
+def seconds_of(plant: str) -> float:
+    """Length of a flight, s."""
+    return SECONDS * _spread(plant)
 
 
 def programme_of(programme: str, plant: str, random: np.random.Generator) -> tuple[str, ...]:
     """Specs of one flight's manoeuvres, amplitudes drawn; a throttle doublet goes with all of them."""
-    slow = 1.6 if plant == "c172p" else 1.0
+    slow, spread = 1.6 if plant == FOREIGN else _slowness(plant), _spread(plant)
     size = {c: a * float(random.uniform(0.8, 1.3)) for c, a in _AMPLITUDE.items()}
-    throttle = f"doublet:throttle:amplitude=0.08:width=2:start={random.uniform(9, 14):.2f}:every=16:repeat=2"
+    start = spread * random.uniform(9, 14)
+    throttle = f"doublet:throttle:amplitude=0.08:width={2 * spread:g}:start={start:.2f}:every={16 * spread:g}:repeat=2"
     if programme == "multisine":
         amplitudes = ",".join(f"{1.5 * a:.4g}" for a in size.values())
-        band = f"length=40:low=0.1:high={2.5 / slow:.2f}:start=1.5"
+        band = f"length={40 * spread:g}:low={0.1 / spread:g}:high={2.5 / slow:.2f}:start=1.5"
         return f"multisine:{','.join(size)}:amplitude={amplitudes}:{band}", throttle
     kinds = {
         "steps": ("3211", "3211", "3211"),
@@ -193,6 +223,7 @@ def programme_of(programme: str, plant: str, random: np.random.Generator) -> tup
         width = slow * float(random.uniform(0.22, 0.35)) * (1.5 if kind == "doublet" else 1.0)
         sign = int(random.choice([-1, 1]))
         specs.append(
-            f"{kind}:{control}:amplitude={sign * amplitude:.4g}:width={width:.3f}:start={start}:every=8:repeat=5"
+            f"{kind}:{control}:amplitude={sign * amplitude:.4g}:width={width:.3f}"
+            f":start={start * spread}:every={8 * spread:g}:repeat=5"
         )
     return (*specs, throttle)

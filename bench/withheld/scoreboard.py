@@ -11,6 +11,10 @@ from scipy.stats import beta
 from bench.pages import table
 from bench.withheld.drawing import FOREIGN
 from bench.withheld.judging import BLAMED, Judged
+from bench.withheld.plants.sizes import SIZES
+
+#: Column of all plants but the foreign one.
+OWN = "own plants"
 
 _ALPHA = 0.05
 _EDGES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.99, 1.01)  # of the bins of stated probability
@@ -27,23 +31,32 @@ def page(cases: Sequence[Judged], failed: Sequence[str] = ()) -> str:
     """The section of the documentation: cases that were judged, and why others could not be."""
     if not cases:
         return "No case was diagnosed."
-    own = [c for c in cases if c.label["plant"] != FOREIGN]
-    foreign = [c for c in cases if c.label["plant"] == FOREIGN]
-    columns = {"all": cases, "own plants": own, FOREIGN: foreign}
-    rows = [[what, *(_share(flags(c)) for c in columns.values()), wanted] for what, flags, wanted in _SCORES]
+    columns = _by_plant(cases)
+    rows = [[what, *(_share(flags(c)) for c in (cases, *columns.values())), wanted] for what, flags, wanted in _SCORES]
+    counts = ", ".join(f"{len(each)} of {'the ' * (name == OWN)}{name}" for name, each in columns.items())
     parts = [
-        f"{len(cases)} cases, {len(own)} of the own plants, {len(foreign)} of {FOREIGN}; in brackets 95 % intervals.",
-        table(("", *columns, "wanted"), rows),
+        f"{len(cases)} cases, {counts}; in brackets 95 % intervals.",
+        table(("", "all", *columns, "wanted"), rows),
         "Probabilities as stated, and the share of them that is right:",
         _calibrated(cases),
-        "The same of the own plants, which have nothing beside what was drawn:",
-        _calibrated(own),
+    ]
+    if OWN in columns:
+        parts += ["The same of the own plants, which have nothing beside what was drawn:", _calibrated(columns[OWN])]
+    parts += [
         "By effect: cases with it, how many were right, and what was said first in the others.",
         table(("effect", "plant", "cases", "right", "else"), _confusion(cases)),
     ]
     if failed:
         parts.append(f"Not flown: {'; '.join(failed)}.")
     return "\n\n".join(parts)
+
+
+def _by_plant(cases: Sequence[Judged]) -> dict[str, Sequence[Judged]]:
+    """The cases of the own plants and of the foreign one, or of each size where other sizes were flown."""
+    plants = {name: [c for c in cases if c.label["plant"] == name] for name in (FOREIGN, *SIZES)}
+    if any(plants[name] for name in SIZES):
+        return {name: plants[name] for name in SIZES}
+    return {OWN: [c for c in cases if c.label["plant"] != FOREIGN], FOREIGN: plants[FOREIGN]}
 
 
 def _share(flags: Iterable[bool]) -> str:
@@ -132,12 +145,13 @@ def calibration(stated: Sequence[tuple[float, bool]]) -> str:
 def _confusion(cases: _Cases) -> list[list[str]]:
     rows = []
     for effect in sorted({e for c in cases for e in _effects(c)}):
-        for plant in ("own", FOREIGN):
-            own = [c for c in cases if effect in _effects(c) and (c.label["plant"] == FOREIGN) == (plant == FOREIGN)]
-            if own:
-                missed = Counter(c.first for c in own if not _found(effect, c))
+        for plant, flown in _by_plant(cases).items():
+            with_it = [c for c in flown if effect in _effects(c)]
+            if with_it:
+                missed = Counter(c.first for c in with_it if not _found(effect, c))
                 others = ", ".join(f"{name} {count}" for name, count in missed.most_common())
-                rows.append([effect, plant, str(len(own)), str(sum(_found(effect, c) for c in own)), others])
+                right = str(sum(_found(effect, c) for c in with_it))
+                rows.append([effect, plant.removesuffix(" plants"), str(len(with_it)), right, others])
     return rows
 
 

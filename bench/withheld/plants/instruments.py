@@ -36,7 +36,14 @@ SUITES = {
     "research": Suite(200.0, 100.0, 100.0, 0.0002, 0.002),
     "autopilot": Suite(250.0, 50.0, 50.0, 0.0005, 0.005),
     "small": Suite(100.0, 50.0, 50.0, 0.001, 0.01),
+    "fast": Suite(400.0, 100.0, 200.0, 0.0002, 0.002),
+    "fifty": Suite(50.0, 50.0, 50.0, 0.0005, 0.005),
+    "slow": Suite(25.0, 25.0, 25.0, 0.0005, 0.005),
+    "ten": Suite(10.0, 10.0, 10.0, 0.0005, 0.005),
 }
+
+#: Those of small aircraft.
+USUAL = ("research", "autopilot", "small")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.withheld.drawing import SECONDS, SETS, Case, draw
+from bench.withheld.drawing import SETS, Case, draw, seconds_of
 from bench.withheld.mattering import beyond, inexplicable, moved, noisy, stamped
 from bench.withheld.plants.actuators import servo_lag
 from bench.withheld.plants.flying import fly
@@ -23,6 +23,7 @@ from bench.withheld.plants.instruments import SUITES, Log, readings, record
 from bench.withheld.plants.motion import Airframe, DivergedError, Effects, Instant
 from bench.withheld.plants.pilot import Pilot
 from bench.withheld.plants.rigid import Rigid
+from bench.withheld.plants.sizes import SIZES, sized
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
@@ -35,7 +36,7 @@ Array = NDArray[np.float64]
 RATE = 400.0  # Hz
 ATTEMPTS = 12
 ENOUGH = 3.0  # times the noise by which an effect must move the response, and what tolerances leave of it
-_HEIGHT = {"c172p": 300.0}  # m above the ground, for the turbulence
+_HEIGHT = {"c172p": 300.0, "transport": 1000.0}  # m above the ground, for the turbulence
 _LOW = 100.0
 
 
@@ -61,7 +62,9 @@ class Plant:
         airframe = self.airframe(effects)
         random = np.random.default_rng([SETS[self.which], self.case.seed, 1 + flight])
         air, own = random.spawn(2)
-        plan = parse_manoeuvre(self.case.manoeuvres[min(flight, 1)], _with_thrust(self.truth), RATE, SECONDS)
+        plan = parse_manoeuvre(
+            self.case.manoeuvres[min(flight, 1)], _with_thrust(self.truth), RATE, seconds_of(self.case.plant)
+        )
         planned = {n: plan.deflections[n] for n in airframe.controls}
         planned["thrust"] = plan.deflections["throttle"] * _thrust_unit(self.truth)
         highest = _thrust_unit(self.truth)
@@ -90,7 +93,7 @@ def _aircraft(name: str) -> Aircraft:
         from bench.withheld.plants.cessna import aircraft  # noqa: PLC0415
 
         return aircraft()
-    return load_aircraft(name)
+    return sized(name) if name in SIZES else load_aircraft(name)
 
 
 def _with_thrust(aircraft: Aircraft) -> Aircraft:
