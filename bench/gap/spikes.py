@@ -21,6 +21,7 @@ from bench.pages import publish
 from bench.spikes import ledger, scores
 from bench.spikes.drawing import SETS, Case, draw
 from bench.spikes.editing import edited, misbelieved
+from bench.spikes.excusing import ratio_left
 from bench.spikes.records import FLIGHTS, belief, part, rate_of
 from bench.withheld.ledger import version
 from sysid_node.aircraft.model import Aircraft
@@ -93,7 +94,9 @@ def diagnosed(folder: Path, case: Case) -> dict[str, Any]:
         said = document(diagnose(aircraft, fitted, held))
     except InputError as error:
         refusal = str(error)
-    return ledger.row(case, said, refusal, time.process_time() - begin, version())
+    seconds = time.process_time() - begin
+    left = ratio_left(folder, case) if case.effect else None
+    return ledger.row(case, left, said, refusal, seconds, version())
 
 
 def gap_flight(aircraft: Aircraft, record: FlightRecord, source: str) -> GapFlight:

@@ -22,9 +22,15 @@ def read(path: Path) -> list[Row]:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
-def row(case: Case, said: Mapping[str, Any] | None, refusal: str, seconds: float, version: str) -> Row:
-    """A line: what was put in, and what was said of it (gap.json), or why the flight was refused."""
+def row(
+    case: Case, left: float | None, said: Mapping[str, Any] | None, refusal: str, seconds: float, version: str
+) -> Row:
+    """A line: what was put in, and what was said of it (gap.json), or why the flight was refused.
+
+    ``left`` is what tolerances leave of the effect (``excusing.ratio_left``); none of a record as it is.
+    """
     found: Row = {"seed": case.seed, "flight": case.flight, "effect": case.effect, "values": dict(case.values)}
+    found |= {"left": left if left is None else round(left, 3)}
     found |= {"seconds": round(seconds, 1), "version": version, "refusal": refusal}
     if said is None:
         return found | {"verdict": "refused", "gap": None, "air_motion": None, "causes": [], "doubted": []}

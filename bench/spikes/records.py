@@ -153,13 +153,26 @@ def belief(folder: Path, flight: Flight) -> Aircraft:
     """The aircraft file: the record's own derivatives, each with a tolerance."""
     parts = [part(folder, flight, span) for span in flight.learned]
     bare = _without_derivatives(folder, flight, parts)
-    tables = [_regression(bare, flight, record) for record in parts]
+    tables = [regression(bare, flight, record) for record in parts]
     derivatives = {}
     for index, (coefficient, regressors) in enumerate(_structure(flight).items()):
         left = np.concatenate([found[:, index] for found, _ in tables])
         columns = {r: np.concatenate([x[r] for _, x in tables]) for r in regressors}
         derivatives |= _fitted(coefficient, left, columns)
     return replace(bare, derivatives=derivatives)
+
+
+def regression(bare: Aircraft, flight: Flight, record: FlightRecord) -> tuple[Array, dict[str, Array]]:
+    """Coefficients (N, 6) and regressors (N,) of a part, low-passed; commands as late as the surfaces are."""
+    seen = np.nan_to_num(np.column_stack([record[name] for name in _READINGS]))
+    commands = [np.nan_to_num(record[s]) for s in bare.control_symbols]
+    rate = rate_of(record)
+    late = [_followed(np.interp(record.time - flight.late, record.time, c), flight.lag * rate) for c in commands]
+    found, x = coefficients(bare, seen, np.column_stack([*late, np.nan_to_num(record["thrust"])]), record["rho"], rate)
+    low = butter(4, min(_BAND, 0.4 * rate), fs=rate, output="sos")
+    kept = slice(round(0.5 * rate), -round(0.5 * rate))
+    x["V"] = record["V"] / bare.reference.airspeed
+    return sosfiltfilt(low, found, axis=0)[kept], {n: sosfiltfilt(low, v)[kept] for n, v in x.items()}
 
 
 def _noise(records: Sequence[FlightRecord]) -> dict[str, float]:
@@ -197,19 +210,6 @@ def _without_derivatives(folder: Path, flight: Flight, records: Sequence[FlightR
         noise=_noise(records),
         noise_bias=dict(flight.bias),
     )
-
-
-def _regression(bare: Aircraft, flight: Flight, record: FlightRecord) -> tuple[Array, dict[str, Array]]:
-    """Coefficients (N, 6) and regressors (N,) of a part, low-passed; commands as late as the surfaces are."""
-    seen = np.nan_to_num(np.column_stack([record[name] for name in _READINGS]))
-    commands = [np.nan_to_num(record[s]) for s in bare.control_symbols]
-    rate = rate_of(record)
-    late = [_followed(np.interp(record.time - flight.late, record.time, c), flight.lag * rate) for c in commands]
-    found, x = coefficients(bare, seen, np.column_stack([*late, np.nan_to_num(record["thrust"])]), record["rho"], rate)
-    low = butter(4, min(_BAND, 0.4 * rate), fs=rate, output="sos")
-    kept = slice(round(0.5 * rate), -round(0.5 * rate))
-    x["V"] = record["V"] / bare.reference.airspeed
-    return sosfiltfilt(low, found, axis=0)[kept], {n: sosfiltfilt(low, v)[kept] for n, v in x.items()}
 
 
 def _followed(command: Array, lag: float) -> Array:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from bench.pages import table
 from bench.withheld.scoreboard import calibration, interval
 
+from .excusing import INEXCUSABLE
 from .judging import Judged, judge
 from .records import FLIGHTS
 
@@ -23,7 +24,7 @@ def page(rows: Sequence[Mapping[str, Any]]) -> str:
     stated = [each for _, judged in pairs for each in judged.stated]
     parts = [
         f"{len(spiked)} cases with an effect put in, {len(unspiked)} records as they are; in brackets 95 % intervals.",
-        table(("", "", "wanted"), _overall(spiked, unspiked)),
+        table(("", "all", "beyond three tolerances", "wanted"), _overall(spiked, unspiked)),
         "The records as they are:",
         table(("record", "verdict", "gap, left, floor", "named", "doubted", "it holds"), map(_as_it_is, unspiked)),
         "By effect:",
@@ -31,7 +32,7 @@ def page(rows: Sequence[Mapping[str, Any]]) -> str:
         "By record:",
         _grouped(spiked, "flight"),
         "Those that were not named:",
-        table(("record", "put in", "said"), (_missed(row) for row, judged in spiked if not judged.named)),
+        table(("record", "put in", "left", "said"), (_missed(row) for row, judged in spiked if not judged.named)),
     ]
     if stated:
         parts += ["Probabilities as stated, and the share of them that is right:", calibration(stated)]
@@ -53,13 +54,22 @@ def share(flags: Iterable[bool | None]) -> str:
 
 
 def _overall(spiked: _Pairs, unspiked: _Pairs) -> list[list[str]]:
-    return [
-        ["as they are: nothing blamed above 0.8 that is not there", share(not j.blamed for _, j in unspiked), "all"],
-        ["put in: named first, or beside what the record holds", share(j.named for _, j in spiked), "85 %"],
-        ["of those named: size within 20 % or its interval", share(j.sized for _, j in spiked), "85 %"],
-        ["gap within 10 % of that of the record as it is", share(j.closed for _, j in spiked), "85 %"],
-        ["the same, of those named", share(j.closed for _, j in spiked if j.named), ""],
-    ]
+    """Of all cases, and of those that three tolerances of the derivatives do not excuse."""
+    beyond = [pair for pair in spiked if (pair[0].get("left") or 0.0) >= INEXCUSABLE]
+    rows = [["as they are: nothing blamed above 0.8 that is not there", share(not j.blamed for _, j in unspiked), "",
+             "all"]]  # fmt: skip
+    for words, flags, wanted in _SCORES:
+        rows.append([words, share(flags(spiked)), share(flags(beyond)), wanted])
+    return rows
+
+
+#: What is scored of cases with an effect put in: in words, of each case, and what is wanted.
+_SCORES: tuple[tuple[str, Callable[[_Pairs], Iterable[bool | None]], str], ...] = (
+    ("put in: named first, or beside what the record holds", lambda c: [j.named for _, j in c], "85 %"),
+    ("of those named: size within 20 % or its interval", lambda c: [j.sized for _, j in c], "85 %"),
+    ("gap within 10 % of that of the record as it is", lambda c: [j.closed for _, j in c], "85 %"),
+    ("the same, of those named", lambda c: [j.closed for _, j in c if j.named], ""),
+)
 
 
 def _as_it_is(pair: tuple[Mapping[str, Any], Judged]) -> list[str]:
@@ -86,7 +96,8 @@ def _missed(row: Mapping[str, Any]) -> list[str]:
     put = ", ".join(f"{name} {value:.3g}" for name, value in row["values"].items())
     said = row["refusal"] or f"{row['verdict']}: {_names(row['causes'])}"
     doubted = f"; doubted: {_names(row['doubted'])}" if row["doubted"] else ""
-    return [row["flight"], f"{row['effect']} ({put})", said + doubted]
+    left = f"{row['left']:.2f}" if row.get("left") else "-"
+    return [row["flight"], f"{row['effect']} ({put})", left, said + doubted]
 
 
 def _names(causes: Sequence[Mapping[str, Any]]) -> str:

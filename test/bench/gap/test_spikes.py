@@ -12,6 +12,7 @@ from bench.gap.spikes import diagnosed
 from bench.spikes import ledger, scores
 from bench.spikes.drawing import SETS, Case, draw
 from bench.spikes.editing import EFFECTS, edited, misbelieved
+from bench.spikes.excusing import INEXCUSABLE, ratio_left
 from bench.spikes.judging import judge
 from bench.spikes.records import FLIGHTS, belief
 from sysid_node.aircraft.load import load_aircraft
@@ -85,7 +86,7 @@ def test_a_belief_is_wrong_by_what_was_put_in() -> None:
 
 def _row(effect: str, values: dict[str, float], *causes: dict[str, Any], after: float = 0.1) -> dict[str, Any]:
     said = {"verdict": "explained", "gap": {**GAP, "after": after}, "air_motion": 0.0, "doubted": []}
-    return ledger.row(Case(9, "thor", effect, values), {**said, "causes": list(causes)}, "", 1.0, "now")
+    return ledger.row(Case(9, "thor", effect, values), None, {**said, "causes": list(causes)}, "", 1.0, "now")
 
 
 def _cause(effect: str, probability: float = 0.95, rivals: tuple[str, ...] = (), **sizes: float) -> dict[str, Any]:
@@ -125,10 +126,14 @@ def test_nothing_may_be_blamed_in_a_record_as_it_is() -> None:
 
 def test_the_page_counts_cases_and_lists_what_was_missed() -> None:
     bare = {**_row("", {}), "seed": 0}
-    rows = [bare, _row("imu_bias", {"p": 0.03}, _cause("imu_bias", p=0.03)), _row("mass_error", {"error": 0.25})]
+    rows = [
+        bare,
+        _row("imu_bias", {"p": 0.03}, _cause("imu_bias", p=0.03)),
+        {**_row("mass_error", {"error": 0.25}), "left": 1.7},
+    ]
     text = scores.page(rows)
     assert "2 cases with an effect put in, 1 records as they are" in text
-    assert "| thor | mass_error (error 0.25) | explained: - |" in text
+    assert "| thor | mass_error (error 0.25) | 1.70 | explained: - |" in text
 
 
 @pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
@@ -157,6 +162,15 @@ def test_the_belief_has_the_derivatives_that_the_field_finds() -> None:
 def test_the_belief_states_the_noise_that_the_record_shows() -> None:
     """Of the HFB-320's pitch rate the upper third of the spectrum (3.5 to 5 Hz) has the power of 0.0003 to 0.0005."""
     assert 3e-4 < belief(RECORDS, FLIGHTS["hfb320"]).noise["gyro"] < 5e-4
+
+
+@pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
+def test_tolerances_excuse_what_lies_within_three_of_them_and_no_more() -> None:
+    """The stability of the Twin Otter has a tolerance of a tenth, 0.15; a mass shifts each coefficient alike."""
+    excused = Case(0, "twin_otter", "derivative_error", {"Cm_alpha": 0.3})
+    assert ratio_left(RECORDS, excused) == pytest.approx(1.0, abs=0.01)
+    assert ratio_left(RECORDS, Case(0, "twin_otter", "derivative_error", {"Cm_alpha": 0.93})) > INEXCUSABLE
+    assert ratio_left(RECORDS, Case(0, "hfb320", "mass_error", {"error": 0.25})) < INEXCUSABLE
 
 
 @pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
