@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.batch.models.model import ModelParameter
-from sysid_node.dynamics.airflow import speed_of, velocity_of
+from sysid_node.dynamics.airflow import flow_angles, velocity_of
 
 Signals = Mapping[str, jax.Array]
 
@@ -84,8 +84,7 @@ def _flow(s: Signals) -> dict[str, jax.Array]:
     gusts = (s.get(name, still) for name in ("gust_u", "gust_v", "gust_w"))
     velocity = velocity_of((s["V"], s["alpha"], s["beta"]), jnp)
     u, v, w = (inertial - gust for inertial, gust in zip(velocity, gusts, strict=True))
-    speed = speed_of((u, v, w), jnp)
-    return {"V": speed, "alpha": jnp.arctan2(w, u), "beta": jnp.arcsin(v / speed)}
+    return dict(zip(("V", "alpha", "beta"), flow_angles((u, v, w), jnp), strict=True))
 
 
 def _pitch_time(flow: Signals, span: float) -> jax.Array:

@@ -12,8 +12,11 @@ import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Vector3
 from sysid_node.batch.models.model import ModelParameter, Scalars, StateSpaceModel
-from sysid_node.dynamics.airflow import wind_axes_rates
+from sysid_node.dynamics.airflow import flow_angles, velocity_of, wind_axes_rates
 from sysid_node.dynamics.atmosphere import GRAVITY
+from sysid_node.dynamics.attitude import down_of_euler, euler_rates
+from sysid_node.dynamics.lever_arm import velocity_at
+from sysid_node.dynamics.vector import Vector
 
 Signals = Mapping[str, jax.Array]
 
@@ -32,33 +35,24 @@ SENSOR_ERRORS = {
 
 def flow_rates(s: Signals, force: tuple[jax.Array, jax.Array, jax.Array]) -> dict[str, jax.Array]:
     """Derivatives of V, alpha, beta from signals V alpha beta p q r phi theta and the specific force (body axes)."""
-    fx, fy, fz = force
-    st, ct, sp, cp = jnp.sin(s["theta"]), jnp.cos(s["theta"]), jnp.sin(s["phi"]), jnp.cos(s["phi"])
-    acceleration = fx - GRAVITY * st, fy + GRAVITY * ct * sp, fz + GRAVITY * ct * cp
+    acceleration = Vector(*force).plus(down_of_euler(s["phi"], s["theta"], jnp).times(GRAVITY))
     flow, rates = (s["V"], s["alpha"], s["beta"]), (s["p"], s["q"], s["r"])
     return dict(zip(("V", "alpha", "beta"), wind_axes_rates(flow, rates, acceleration, jnp), strict=True))
 
 
 def attitude_rates(s: Signals) -> dict[str, jax.Array]:
     """Derivatives of the Euler angles phi, theta, psi at signals p q r phi theta."""
-    turn = s["q"] * jnp.sin(s["phi"]) + s["r"] * jnp.cos(s["phi"])
-    return {
-        "phi": s["p"] + jnp.tan(s["theta"]) * turn,
-        "theta": s["q"] * jnp.cos(s["phi"]) - s["r"] * jnp.sin(s["phi"]),
-        "psi": turn / jnp.cos(s["theta"]),
-    }
+    rates = euler_rates(s["phi"], s["theta"], Vector(s["p"], s["q"], s["r"]), jnp)
+    return dict(zip(("phi", "theta", "psi"), rates, strict=True))
 
 
 def at_probe(position: Vector3, s: Signals) -> dict[str, jax.Array]:
     """V, alpha, beta where the probe sits, m from the CG: the rotation moves it through the air."""
     if not any(position):
         return {}
-    x, y, z = position
-    u = s["V"] * jnp.cos(s["alpha"]) * jnp.cos(s["beta"]) + s["q"] * z - s["r"] * y
-    v = s["V"] * jnp.sin(s["beta"]) + s["r"] * x - s["p"] * z
-    w = s["V"] * jnp.sin(s["alpha"]) * jnp.cos(s["beta"]) + s["p"] * y - s["q"] * x
-    speed = jnp.sqrt(u**2 + v**2 + w**2)
-    return {"V": speed, "alpha": jnp.arctan2(w, u), "beta": jnp.arcsin(v / speed)}
+    velocity = velocity_of((s["V"], s["alpha"], s["beta"]), jnp)
+    flow = flow_angles(velocity_at(velocity, (s["p"], s["q"], s["r"]), position), jnp)
+    return dict(zip(("V", "alpha", "beta"), flow, strict=True))
 
 
 def sensor_errors(outputs: Sequence[str], probe: Vector3 = (0.0, 0.0, 0.0)) -> StateSpaceModel:
