@@ -10,7 +10,10 @@ import numpy as np
 from bench.withheld.plants.instruments import USUAL
 from bench.withheld.plants.sizes import SIZES, chord, slower
 
-SETS = {"development": 20260101, "final": 20260401, "sizes_development": 20261101, "sizes": 20261125}
+SETS = {"development": 20260101, "final": 20260401, "sizes_development": 20261101, "sizes": 20261125,
+        "servos": 20261126}  # fmt: skip
+#: Sets whose aircraft files state the plants' servos.
+STATED_SERVOS = ("servos",)
 PLANTS = {"cdfp": 0.25, "cdrw": 0.25, "kestrel": 0.25, "c172p": 0.25}  # the last flies in JSBSim
 #: Plants of the two sets of other sizes, and the instruments that each may have.
 SIZED = dict.fromkeys(SIZES, 1.0 / len(SIZES))

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.withheld.drawing import SETS, Case, draw, seconds_of
+from bench.withheld.drawing import SETS, STATED_SERVOS, Case, draw, seconds_of
 from bench.withheld.mattering import beyond, inexplicable, moved, noisy, stamped
 from bench.withheld.plants.actuators import servo_lag
 from bench.withheld.plants.flying import fly
@@ -26,7 +26,7 @@ from bench.withheld.plants.rigid import Rigid
 from bench.withheld.plants.sizes import SIZES, sized
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.model import Aircraft, UncertainValue
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.bag.writer import write_streams
 from sysid_node.sim.signals.dryden import INTENSITIES, Dryden
@@ -118,7 +118,15 @@ def _in_units(effects: Mapping[str, Mapping[str, float]], aircraft: Aircraft) ->
 def handed_over(plant: Plant) -> tuple[Aircraft, np.random.Generator]:
     """The aircraft file of a case, and what its recording's noise is drawn from then."""
     random = np.random.default_rng([SETS[plant.which], plant.case.seed, 99])
-    return believed(plant.truth, random), random
+    belief = believed(plant.truth, random)
+    return (with_servos(belief, plant.case.servo) if plant.which in STATED_SERVOS else belief), random
+
+
+def with_servos(aircraft: Aircraft, servo: float) -> Aircraft:
+    """The file with the lag of servos of so many Hz, as data sheets have it: within a fifth (1 sigma)."""
+    lag = servo_lag(servo)
+    stated = {"actuator_lag": {name: UncertainValue(lag, 0.2 * lag) for name in aircraft.controls}}
+    return replace(aircraft, effects={**aircraft.effects, **stated})
 
 
 def believed(aircraft: Aircraft, random: np.random.Generator) -> Aircraft:

@@ -18,6 +18,7 @@ from bench.withheld.plants.actuators import Actuators
 from bench.withheld.plants.cessna import Cessna, aircraft
 from bench.withheld.plants.instruments import Log, readings
 from bench.withheld.plants.motion import Effects, Instant
+from bench.withheld.plants.plant import with_servos
 from bench.withheld.plants.rigid import Rigid
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.sim import Simulator
@@ -176,3 +177,12 @@ def test_derivatives_excuse_what_lies_within_three_tolerances_of_the_file() -> N
         left[off] = inexplicable(log, seen, file, {}, RATE)[:, 4].std()
     deflected = CM_DE * log.commands[:, 0].std()
     assert left[2.0] < 0.1 * deflected and left[6.0] > 0.5 * deflected
+
+
+def test_a_file_that_states_servos_is_as_late_as_they_are() -> None:
+    """Truth: the lag of second order, twice the damping over the natural frequency."""
+    stated = with_servos(KNOWN, 30.0).effects["actuator_lag"]
+    assert set(stated) == set(KNOWN.controls)
+    for lag in stated.values():
+        assert lag.value == pytest.approx(2.0 * 0.7 / (2.0 * np.pi * 30.0), rel=0.02)
+        assert lag.tolerance == pytest.approx(0.2 * lag.value)
