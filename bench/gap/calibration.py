@@ -1,6 +1,7 @@
 """Whether the probabilities that ``sysid gap`` states mean what they say, over several sets of withheld effects.
 
-    python -m bench.gap.calibration bench/withheld/ledgers/*.jsonl [--page docs/results/gap_scoreboard.md]
+    python -m bench.gap.calibration bench/withheld/ledgers/{seeds_820,seeds_1200,final}.jsonl \
+        [--page docs/results/gap_scoreboard.md]
 
 Reads ledgers of ``bench/gap/scoreboard.py``: probabilities as they were stated, each set by its own version. One set of
 300 cases has few causes in the middle bins; together they have enough to tell chance from what is stated wrongly.

@@ -8,9 +8,10 @@ from aircraft_loads import loads
 
 pytest.importorskip("jsbsim", reason="JSBSim is not installed")
 
+from sysid_node.sim import Simulator
 from sysid_node.sim.importing.jsbsim.files import copy_model
 from sysid_node.sim.importing.jsbsim.program import Program
-from sysid_node.sim.importing.jsbsim.read import read_model
+from sysid_node.sim.importing.jsbsim.read import read_jsbsim, read_model
 
 
 @pytest.fixture(scope="module", params=[("T37", 77.0), ("c172p", 52.0)], ids=["T37", "c172p"])
@@ -55,3 +56,12 @@ def test_thrust_lags_the_throttle_as_the_engine_does(model, tmp_path):
         flown.append((early, program.loads().engine[0]))
     early, late = np.diff(flown, axis=0)[0]
     assert 0.55 < early / late < 0.75
+
+
+def test_an_engine_that_is_later_than_a_file_can_state_is_imported_as_a_file_that_can_be_flown():
+    """Camel's answers a step of the throttle 0.9 s late; with the longest delay, its lag is as much longer."""
+    imported = read_jsbsim("Camel")
+    effects = imported.aircraft.effect_values()
+    assert effects["command_delay"]["throttle"] == 0.5
+    assert effects["motor_lag"]["time_constant"] + 0.5 == pytest.approx(3.34, abs=0.1)
+    Simulator(imported.aircraft, 50.0).vector({})

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.sim.effects import command_delay
 from sysid_node.sim.importing.jsbsim.program import Flight, Program
 
 Array = NDArray[np.float64]
@@ -22,8 +23,8 @@ _RUNNING, _WATCHED, _RATE = 0.2, 6.0, 50.0
 #: Shares of a step at which its answer is timed.
 _SHARES = (1.0 - math.exp(-1.0 / 3.0), 1.0 - math.exp(-1.0))
 
-#: Lags and delays below this count as none, s.
-_SHORTEST = 0.02
+#: Lags and delays below this count as none, s; the longest delay is that which an aircraft file can state.
+_SHORTEST, _LONGEST = 0.02, command_delay.LONGEST
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,8 @@ def _answer(program: Program, state: Flight) -> tuple[float, float]:
     """Delay and time constant (s) with which the thrust follows a step of the throttle.
 
     They are those of the first-order lag with delay that has done 28.3 and 63.2 % of what the step does in the end at
-    the same times: C. L. Smith (1972), "Digital Computer Process Control".
+    the same times: C. L. Smith (1972), "Digital Computer Process Control". Of an engine that is later than a file can
+    state the lag is as much longer, so that 63.2 % are done at the same time.
     """
     low, high = max(state.throttle - _STEP, 0.0), min(state.throttle + _STEP, 1.0)
     flown = [_course(program, state, low, throttle) for throttle in (low, high)]
@@ -63,8 +65,9 @@ def _answer(program: Program, state: Flight) -> tuple[float, float]:
     early, late = (float(np.argmax(change >= share * change[-1])) / _RATE for share in _SHARES)
     lag = 1.5 * (late - early)
     delay = late - lag
-    if delay <= _SHORTEST:
-        delay, lag = 0.0, late
+    if not _SHORTEST < delay < _LONGEST:
+        delay = 0.0 if delay <= _SHORTEST else _LONGEST
+        lag = late - delay
     return delay, lag if lag > _SHORTEST else 0.0
 
 
