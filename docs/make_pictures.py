@@ -29,7 +29,7 @@ RUNS = {
 }
 #: Name of each picture: the run whose report it shows, the sections, and its size in pixels.
 SHOWN = {
-    "replay_opening": ("replay", ("opening", "derivatives"), (900, 1064)),
+    "replay_opening": ("replay", ("opening", "derivatives"), (1200, 1080)),
     "replay_history": ("replay", ("history",), (900, 668)),
     "failed_faults": ("failed", ("faults",), (1000, 240)),
     "gap_opening": ("gap", ("opening",), (900, 330)),
