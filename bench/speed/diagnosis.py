@@ -14,6 +14,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -48,12 +49,12 @@ def main() -> None:
 
 
 def _measured(folder: Path, repeat: int) -> str:
-    one, other = (_flown(folder / f"flight_{seed}", seed) for seed in (3, 4))
-    _diagnosed([one], folder, "first")  # reads what every later run finds in the machine's memory
-    cold, runs = _diagnosed([one], folder, "cold"), {}
+    one, other = (flown(folder / f"flight_{seed}", seed) for seed in (3, 4))
+    diagnosed([one], folder, "first")  # reads what every later run finds in the machine's memory
+    cold, runs = diagnosed([one], folder, "cold"), {}
     for name, bags in (("the same, programs kept", [one]), ("another flight", [other]), ("both", [one, other])):
-        _diagnosed(bags, folder, "warm")
-        runs[name] = [_diagnosed(bags, folder, "warm") for _ in range(repeat)]
+        diagnosed(bags, folder, "warm")
+        runs[name] = [diagnosed(bags, folder, "warm") for _ in range(repeat)]
     rows = [_row("one flight, no programs kept", [cold]), *(_row(name, costs) for name, costs in runs.items())]
     single, second, both = (_processor(costs) for costs in runs.values())
     heads = ("", "by the clock, s", "processor time, s", "peak memory, GB")
@@ -61,15 +62,18 @@ def _measured(folder: Path, repeat: int) -> str:
     return f"{table(heads, rows)}\n\n{os.cpu_count()} processors; medians of {repeat}. {share}"
 
 
-def _flown(bag: Path, seed: int) -> Path:
-    words = [*_SYSID, "simulate", "--aircraft", _AIRCRAFT, *_FLIGHT, "--seed", str(seed), "--out", str(bag), "--quiet"]
+def flown(bag: Path, seed: int, flight: Sequence[str] = _FLIGHT) -> Path:
+    """A simulated flight, by the arguments of ``sysid simulate``."""
+    words = [*_SYSID, "simulate", "--aircraft", _AIRCRAFT, *flight, "--seed", str(seed), "--out", str(bag), "--quiet"]
     subprocess.run(words, check=True, capture_output=True)
     return bag
 
 
-def _diagnosed(bags: list[Path], folder: Path, cache: str) -> Cost:
+def diagnosed(
+    bags: Sequence[Path], folder: Path, cache: str, simulator: Sequence[str] = ("--aircraft", _AIRCRAFT)
+) -> Cost:
     """One diagnosis in a process of its own, with programs kept in a cache of this name."""
-    words = [*_SYSID, "gap", *map(str, bags), "--aircraft", _AIRCRAFT, "--quiet", "--out", str(folder / "out")]
+    words = [*_SYSID, "gap", *map(str, bags), *simulator, "--quiet", "--out", str(folder / "out")]
     before = os.times().elapsed
     with (folder / "said").open("w") as said:
         process = subprocess.Popen(

@@ -1,0 +1,85 @@
+"""What ``sysid gap`` costs where the simulator models more: with effects and tables in the file, or by its own flights.
+
+    python -m bench.speed.diagnosis_of_models [--repeat 3] [--page docs/results/cost.md]
+
+One flight of 60 s at 100 Hz (cdrw, light turbulence, an actuator's lag) is held against three files: the file as it is,
+the same with servos and two tables, and a surrogate that is identified from two simulated flights of 60 s. Programs are
+kept. Run it on an idle machine; the ratio of two files tells of any.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import tempfile
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from bench.pages import publish, table
+from bench.speed.diagnosis import Cost, diagnosed, flown
+from sysid_node.aircraft.dump import dump_aircraft
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import LookupTable, UncertainValue
+
+_AIRCRAFT = "cdrw"
+_SERVO = UncertainValue(0.03, 0.006)  # s
+#: What is flown in the user's simulator, which has no noise and no lag.
+_PLAIN = ("--noise", "0", "--rate", "100", "--duration", "60")
+_SIMULATED = (
+    (*_PLAIN, *(word for s in ("elevator", "aileron", "rudder") for word in ("--manoeuvre", f"3211:{s}:repeat=6"))),
+    (*_PLAIN, "--manoeuvre", "multisine"),
+)
+
+
+def main() -> None:
+    """Print the table, or put it in a page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeat", type=int, default=3, help="times that each is run (default: 3)")
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        text = _measured(Path(folder), args.repeat)
+    publish("bench/speed/diagnosis_of_models.py", text, args.page)
+
+
+def _measured(folder: Path, repeat: int) -> str:
+    real = flown(folder / "real", 3)
+    simulated = [flown(folder / f"simulated_{k}", k, flight) for k, flight in enumerate(_SIMULATED)]
+    detailed = _detailed(folder / "detailed.yaml")
+    kinds: Mapping[str, list[str]] = {
+        "the file alone": ["--aircraft", _AIRCRAFT],
+        "with servos and two tables in the file": ["--aircraft", str(detailed)],
+        "by two simulated flights of 60 s": ["--aircraft", _AIRCRAFT, "--simulated", *map(str, simulated)],
+    }
+    costs = {name: _repeated(real, words, folder, repeat) for name, words in kinds.items()}
+    base = statistics.median(cost.processor for cost in costs["the file alone"])
+    rows = [_row(name, each, base) for name, each in costs.items()]
+    return f"{table(('', 'by the clock, s', 'processor time, s', 'of the file alone'), rows)}\n\nMedians of {repeat}."
+
+
+def _detailed(path: Path) -> Path:
+    """The aircraft file with servos and two tables."""
+    aircraft = load_aircraft(_AIRCRAFT)
+    alpha = (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
+    tables = (
+        LookupTable("CL", ("alpha",), (alpha,), (0.0, 0.0, 0.0, 0.0, -0.005, -0.03)),
+        LookupTable("Cm", ("alpha", "de"), ((-0.2, 0.3), (-0.3, 0.0, 0.3)), ((0.0, 0.0, 0.0), (0.01, 0.0, -0.01))),
+    )
+    effects = {"actuator_lag": dict.fromkeys(aircraft.controls, _SERVO)}
+    path.write_text(dump_aircraft(replace(aircraft, effects=effects, tables=tables)), encoding="utf-8")
+    return path
+
+
+def _repeated(real: Path, words: list[str], folder: Path, repeat: int) -> list[Cost]:
+    """The costs with programs kept: the first run makes them, and does not count."""
+    return [diagnosed([real], folder, "cache", words) for _ in range(repeat + 1)][1:]
+
+
+def _row(name: str, costs: list[Cost], base: float) -> list[str]:
+    clock, processor = (statistics.median(getattr(cost, key) for cost in costs) for key in ("clock", "processor"))
+    return [name, f"{clock:.1f}", f"{processor:.1f}", f"{processor / base:.2f}"]
+
+
+if __name__ == "__main__":
+    main()
