@@ -39,10 +39,9 @@ def test_an_onset_is_found_though_the_fit_starts_seconds_away(aircraft) -> None:
     assert abs(found.values[loss] - 0.5) < 3.0 * errors[loss] < 0.03
 
 
-@pytest.mark.parametrize("onset", [-10.0, 0.5])
-def test_what_was_lost_before_the_surface_moved_was_lost_before_the_flight(aircraft, onset: float) -> None:
+def test_what_was_lost_before_the_surface_moved_was_lost_before_the_flight(aircraft) -> None:
     """The elevator first moves at 1 s: that it failed half a second earlier shows in nothing."""
-    far, candidate = fitted(aircraft, onset, 6.0)
+    far, candidate = fitted(aircraft, 0.5, 6.0)
     loss, begin = (far.indices.index(i) for i in candidate.indices)
     found = converged(search_onset(far, candidate))
     assert found.values[begin] == pytest.approx(-10.0)
