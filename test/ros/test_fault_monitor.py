@@ -80,7 +80,7 @@ def test_what_fails_in_the_loop_is_said(heard: tuple[LoopWatch, Listener]) -> No
         assert float(listener.faults["aileron"]["size"]) == pytest.approx(0.7, abs=0.2)
         times = [float(listener.faults["aileron"][f"{name} (s since the first IMU message)"]) for name in TIMES]
         assert times == sorted(times)
-        assert any("aileron" in line for line in listener.warnings), listener.warnings
+        until(watch, listener, lambda: any("aileron" in line for line in listener.warnings))
         assert watch.set_effects(f"{LAG} stuck_surface:rudder=1:rudder_position=0.1") == ""
         until(watch, listener, lambda: listener.faults.get("rudder", {}).get("kind") == "stuck surface")
         assert float(listener.faults["rudder"]["size"]) == pytest.approx(0.1, abs=0.01)
