@@ -43,8 +43,11 @@ _FIXED = frozenset(
 )
 
 #: Effects with a parameter that all controls share and one for each control. There is a candidate of the shared one,
-#: one of each control alone, and one of every control by itself.
+#: one of each control alone, and one of every control by itself; of the actuators' lag also one of second order.
 SHARED = tuple(name for name, effect in EFFECTS.items() if effect.shared)
+
+#: The actuators' lag with a damping, which makes it of second order.
+SECOND_ORDER = "actuator_lag of second order"
 
 #: Effects that are one candidate for each control, because each control has an onset of its own.
 PER_CONTROL = ("control_effectiveness_loss", "stuck_surface")
@@ -113,7 +116,7 @@ def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list
             found.append(_whole(simulator, models, effect))
         if effect in SHARED:
             found += _variants(simulator, models, effect)
-    return found
+    return [*found, *_second_order(simulator)]
 
 
 def _whole(simulator: Simulator, models: Sequence[ResidualModel], effect: str) -> Candidate:
@@ -184,6 +187,19 @@ def _variants(simulator: Simulator, models: Sequence[ResidualModel], effect: str
         for control, index, own in zip(controls, indices, starts, strict=True)
     ]
     return [*alone, Candidate(effect, f"{effect} of each control", indices, tuple(zip(*starts, strict=True)))]
+
+
+def _second_order(simulator: Simulator) -> Iterator[Candidate]:
+    """The lag of all actuators with a damping; none where the file states a damping, which the lag then has anyway.
+
+    Most servos are of second order: a motor with inertia in a position loop. A lag of first order cannot describe one
+    that is slow, because it attenuates the command as soon as it delays it.
+    """
+    names, neutral = simulator.names, simulator.neutral()
+    lag, damping = (names.index(f"actuator_lag.{name}") for name in ("time_constant", "damping"))
+    if neutral[damping] == 0.0:
+        starts = tuple((float(neutral[lag]) + more, 0.7) for more in (0.01, 0.03, 0.07))
+        yield Candidate("actuator_lag", SECOND_ORDER, (lag, damping), starts)
 
 
 def _per_coefficient(simulator: Simulator, *, lateral: bool) -> list[Candidate]:

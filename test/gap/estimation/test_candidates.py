@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sysid_node.aircraft.model import UncertainValue
-from sysid_node.gap.estimation.candidates import PER_CONTROL, UNOBSERVABLE, Candidate, candidates_of
+from sysid_node.gap.estimation.candidates import PER_CONTROL, SECOND_ORDER, UNOBSERVABLE, Candidate, candidates_of
 from sysid_node.gap.residuals.parameter_priors import bounds
 from sysid_node.sim import EFFECTS, Simulator
 
@@ -44,7 +44,17 @@ def test_lags_limits_and_delays_act_on_all_controls_on_one_or_on_each(candidates
     for effect in ("actuator_lag", "actuator_rate_limit", "command_delay"):
         found = {c.scope: [names[i].partition(".")[2] for i in c.indices] for c in candidates if c.effect == effect}
         alone = {control: [control] for control in controls}
-        assert found == {"": [EFFECTS[effect].shared], **alone, "each control": list(controls)}
+        second = {"second order": ["time_constant", "damping"]} if effect == "actuator_lag" else {}
+        assert found == {"": [EFFECTS[effect].shared], **alone, "each control": list(controls), **second}
+
+
+def test_a_lag_whose_damping_the_file_states_is_of_second_order_anyway(plain_model) -> None:
+    stated = {"time_constant": UncertainValue(0.03), "damping": UncertainValue(0.7)}
+    simulator = Simulator(
+        replace(plain_model.simulator.aircraft, effects={"actuator_lag": stated}), plain_model.simulator.rate
+    )
+    found = candidates_of(simulator, [replace(plain_model, simulator=simulator)])
+    assert SECOND_ORDER not in {candidate.label for candidate in found}
 
 
 def test_derivatives_are_candidates_by_coefficient_and_one_alone(candidates, plain_model) -> None:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from sysid_node.gap.estimation.candidates import SECOND_ORDER
 from sysid_node.gap.selection.alternatives import replace_stepwise
 
 
@@ -36,3 +37,12 @@ def test_the_true_effect_stays(late, alone) -> None:
     stages = [[alone["command_delay"], alone["actuator_lag"]]]
     chosen, _ = replace_stepwise(fitter, base, alone["command_delay"], stages, [])
     assert chosen is alone["command_delay"]
+
+
+@pytest.mark.parametrize("first", ["actuator_lag", "command_delay"])
+def test_servos_of_second_order_are_told_from_a_lag_and_from_a_delay(oscillating, first) -> None:
+    fitter, base, candidates = oscillating
+    fitted = {label: fitter.add_candidate(base, candidate) for label, candidate in candidates.items()}
+    chosen, _ = replace_stepwise(fitter, base, fitted[first], [list(fitted.values())], [])
+    assert [candidate.label for candidate in chosen.fit.candidates] == [SECOND_ORDER]
+    assert chosen.fit.values == pytest.approx([0.06, 0.7], rel=0.05)
