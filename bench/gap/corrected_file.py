@@ -58,14 +58,19 @@ CASES = (
 
 def told(case: Case, number: int) -> dict[str, Any]:
     """What both diagnoses say of one case."""
-    truth = load_aircraft(AIRCRAFT)
-    truth = replace(truth, effects=SERVOS) if case.servos else truth
+    truth = flown_aircraft(servos=case.servos)
     belief = believed(truth, np.random.default_rng(number))
     flights = [fly(truth, belief, case.flown, plan, 100 * number + k, True) for k, plan in enumerate(PLANS)]
     first = diagnose(belief, flights[:1], flights[1:])
     corrected = parse_aircraft(dump_aircraft(corrected_aircraft(first)))
     second = diagnose(corrected, flights[:1], flights[1:])
     return {"first": _shown(first), "second": _shown(second), "effects": _effects(corrected)}
+
+
+def flown_aircraft(*, servos: bool) -> Aircraft:
+    """The aircraft that is flown, with servos of 30 ms where the file states them."""
+    truth = load_aircraft(AIRCRAFT)
+    return replace(truth, effects=SERVOS) if servos else truth
 
 
 def _shown(found: Diagnosis) -> dict[str, Any]:

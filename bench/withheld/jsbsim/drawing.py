@@ -112,10 +112,11 @@ def draw_withheld(which: str, case: Case, aircraft: Aircraft) -> Withheld:
         "one": list(random.choice([*SERVO, *MODEL, *INSTRUMENT], 1)),
         "two": list(random.choice([*SERVO, *MODEL, *INSTRUMENT], 2, replace=False)),
     }[case.kind]
-    return Withheld({str(name): _sized(str(name), aircraft, random) for name in names})
+    return Withheld({str(name): sized(str(name), aircraft, random) for name in names})
 
 
-def _sized(name: str, aircraft: Aircraft, random: np.random.Generator) -> dict[str, float]:
+def sized(name: str, aircraft: Aircraft, random: np.random.Generator) -> dict[str, float]:
+    """One effect's parameter, drawn from what it has, and its size."""
     if name in INSTRUMENT:
         keys, span = INSTRUMENT[name]
         key = keys if isinstance(keys, str) else str(random.choice(keys))
