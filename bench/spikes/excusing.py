@@ -6,18 +6,15 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from bench.spikes.drawing import Case
 from bench.spikes.editing import edited, misbelieved
 from bench.spikes.records import FLIGHTS, Flight, belief, part, regression
+from bench.withheld.mattering import within_tolerances
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.record import FlightRecord
 
 Array = NDArray[np.float64]
-
-#: Tolerances by which a derivative may be off.
-_WIDEST = 3.0
 
 #: Least ratio of what is left with an effect to what is left without it (rms) from which tolerances do not excuse it:
 #: what was put in adds as much power as the record's own errors have.
@@ -54,6 +51,5 @@ def _least(aircraft: Aircraft, coefficient: str, values: Array, columns: dict[st
         return 0.0
     matrix = np.column_stack([columns[regressor] for regressor, _ in known])
     off = values - matrix @ [derivative.value for _, derivative in known]
-    steps = matrix * [derivative.tolerance or 1.0 for _, derivative in known]
-    left = off - steps @ lsq_linear(steps, off, (-_WIDEST, _WIDEST)).x
+    left = within_tolerances(off, matrix, [derivative.tolerance or 1.0 for _, derivative in known])
     return float(left @ left)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
@@ -65,9 +67,14 @@ def inexplicable(log: Log, seen: Array, aircraft: Aircraft, effects: Effects, ra
         own = [(r, d) for n, d in aircraft.derivatives.items() for c, _, r in [n.partition("_")] if c == coefficient]
         matrix = np.column_stack([x[r] for r, _ in own])
         off = sosfiltfilt(low, found[:, i] - matrix @ [d.value for _, d in own])
-        columns = sosfiltfilt(low, matrix, axis=0) * [d.tolerance or 1.0 for _, d in own]
-        left[:, i] = off - columns @ lsq_linear(columns, off, (-_WIDEST, _WIDEST)).x
+        left[:, i] = within_tolerances(off, sosfiltfilt(low, matrix, axis=0), [d.tolerance or 1.0 for _, d in own])
     return left
+
+
+def within_tolerances(off: Array, columns: Array, tolerances: Sequence[float]) -> Array:
+    """What is left of residuals (N,) when derivatives (regressors: (N, D)) do their best within three tolerances."""
+    steps = columns * tolerances
+    return np.asarray(off - steps @ lsq_linear(steps, off, (-_WIDEST, _WIDEST)).x)
 
 
 def noisy(seen: Array, aircraft: Aircraft, rate: float, random: np.random.Generator) -> Array:
