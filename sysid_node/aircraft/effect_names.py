@@ -70,7 +70,7 @@ _PLACE = "x y z"
 EFFECT_NAMES: Mapping[str, EffectNames] = {
     "command_delay": EffectNames((), (EffectParameter("", "s", 0.0, 0.5),), "delay", throttle=True),
     "actuator_lag": _each("s", 0.0, 1.0, EffectParameter("damping", "1", 0.1, 10.0), key="time_constant"),
-    "actuator_backlash": _each("rad", 0.0, 0.5),
+    "actuator_backlash": _each("rad", 0.0, 0.5, key="width"),
     "actuator_rate_limit": _each("rad/s", 0.02, _INFINITE, key="rate"),
     "actuator_bias": _each("rad", -0.5, 0.5),
     "stuck_surface": EffectNames(

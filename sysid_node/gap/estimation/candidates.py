@@ -88,7 +88,7 @@ class Candidate:
     @property
     def scope(self) -> str:
         """The control, coefficient or derivative on which it acts alone; empty where it acts on all."""
-        return self.label.partition(" of ")[2]
+        return "" if self.label == SECOND_ORDER else self.label.partition(" of ")[2]
 
     @property
     def station(self) -> str:
@@ -144,8 +144,7 @@ def _shapes(
         speed = float(np.max([_fastest(model) for model in models]))
         yield "inverse_rate", tuple(1.0 / (max(speed, 0.1) * share) for share in (0.6, 0.3, 0.15, 0.07))
     if effect == "actuator_backlash":
-        # usually one control has backlash; a start that gives it to all of them may fit worse than none
-        yield from ((control, (0.0, 0.025)) for control in simulator.layout.controls)
+        yield "width", tuple(_believed(simulator, effect) + more for more in (0.01, 0.03))
     if effect in TIME_EFFECTS:
         believed = _believed(simulator, effect)
         name = "delay" if effect.endswith("delay") else "time_constant"
@@ -178,9 +177,9 @@ def _variants(simulator: Simulator, models: Sequence[ResidualModel], effect: str
         return []
     indices = tuple(simulator.names.index(f"{effect}.{control}") for control in controls)
     by_speed = {c: 1.0 / max(float(s), 0.1) for c, s in zip(simulator.layout.controls, speeds, strict=True)}
+    usual = (0.01, 0.03) if effect == "actuator_backlash" else (0.03, 0.1)  # rad, s
     starts = [
-        [by_speed[c] / share for share in (0.4, 0.1)] if effect == "actuator_rate_limit" else [0.03, 0.1]
-        for c in controls
+        [by_speed[c] / share for share in (0.4, 0.1)] if effect == "actuator_rate_limit" else [*usual] for c in controls
     ]
     alone = [
         Candidate(effect, f"{effect} of {control}", (index,), tuple((start,) for start in own))

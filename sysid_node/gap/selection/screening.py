@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
-from sysid_node.gap.estimation.candidates import PER_CONTROL, SHARED, Candidate
+from sysid_node.gap.estimation.candidates import PER_CONTROL, SECOND_ORDER, SHARED, Candidate
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.residuals.parameter_priors import bounds
@@ -130,7 +130,9 @@ def _varied(candidate: Candidate) -> str:
 
 def _is_variant(candidate: Candidate) -> bool:
     """Whether a candidate is tried only where it is the best of those of its kind."""
-    return candidate.effect == DERIVATIVE_ERROR or (candidate.effect in SHARED and bool(candidate.scope))
+    if candidate.effect == DERIVATIVE_ERROR or candidate.label == SECOND_ORDER:
+        return True
+    return candidate.effect in SHARED and bool(candidate.scope)
 
 
 def with_found_onsets(candidates: Sequence[Candidate], found: Sequence[Screened]) -> list[Candidate]:

@@ -41,8 +41,12 @@ def test_effects_with_an_onset_are_candidates_of_each_control(candidates, plain_
 
 def test_lags_limits_and_delays_act_on_all_controls_on_one_or_on_each(candidates, plain_model) -> None:
     controls, names = plain_model.simulator.layout.controls, plain_model.simulator.names
-    for effect in ("actuator_lag", "actuator_rate_limit", "command_delay"):
-        found = {c.scope: [names[i].partition(".")[2] for i in c.indices] for c in candidates if c.effect == effect}
+    for effect in ("actuator_lag", "actuator_rate_limit", "actuator_backlash", "command_delay"):
+        found = {
+            c.label.partition(" of ")[2]: [names[i].partition(".")[2] for i in c.indices]
+            for c in candidates
+            if c.effect == effect
+        }
         alone = {control: [control] for control in controls}
         second = {"second order": ["time_constant", "damping"]} if effect == "actuator_lag" else {}
         assert found == {"": [EFFECTS[effect].shared], **alone, "each control": list(controls), **second}
@@ -76,8 +80,7 @@ def test_every_fit_starts_within_its_bounds_and_not_at_neutral(candidates, plain
             inside = (low <= start) & (start <= high)
             onset = np.array([simulator.names[i].endswith(".onset") for i in candidate.indices])
             assert (inside | onset).all(), candidate.label
-            backlash_of_another = candidate.effect == "actuator_backlash" and not start.any()
-            assert backlash_of_another or (start != neutral[list(candidate.indices)]).any(), candidate.label
+            assert (start != neutral[list(candidate.indices)]).any(), candidate.label
 
 
 def test_what_was_not_measured_is_not_blamed(plain_model) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -88,7 +88,7 @@ def _findings(found: Diagnosis) -> str:
             f"{_correction(found, 'With the derivatives fitted within their tolerances,')}"
         )
     known = "the simulator has" if found.surrogate else "the aircraft file says"
-    causes = " and ".join(_cause(cause, known, _rivals(found, cause)) for cause in document(found)["causes"])
+    causes = " and ".join(_cause(cause, known) for cause in document(found)["causes"])
     return " ".join([f"{_share(found)} {causes}.", _correction(found, "With this correction,"), *_doubts(found)])
 
 
@@ -173,7 +173,7 @@ def _left_out(found: Diagnosis) -> str:
     )
 
 
-def _cause(cause: Mapping[str, Any], known: str, rivals: Sequence[str]) -> str:
+def _cause(cause: Mapping[str, Any], known: str) -> str:
     """``actuator lag (time constant 0.110 ± 0.006 s; probability 0.98)``; ``known`` goes before what was believed."""
     units = units_of(cause["effect"])
     shown = [
@@ -188,23 +188,10 @@ def _cause(cause: Mapping[str, Any], known: str, rivals: Sequence[str]) -> str:
     filed = [f"{parameter_words(n)} {number(v, 3)} {unit}".strip() for n, (v, _, unit) in believed.items()]
     if filed:
         shown = [*shown[:4], f"{known} {', '.join(filed[:4])}"]
+    rivals = [label_words(rival) for rival in cause["indistinguishable_from"]]
     alternatives = f"; or {', '.join(rivals)}" if rivals else ""
     probability = f"probability {likely(cause['probability'])}"
     return f"{label_words(cause['label'])} ({'; '.join([*shown[:5], probability])}{alternatives})"
-
-
-def _rivals(found: Diagnosis, cause: Mapping[str, Any]) -> list[str]:
-    """In words, what the flight cannot tell from a cause, servos of second order among it.
-
-    Far below its natural frequency such a servo is late by 2 damping / frequency at all frequencies, as a delay is. No
-    candidate adds a damping to a file that states none.
-    """
-    rivals = [label_words(rival) for rival in cause["indistinguishable_from"]]
-    effects = found.models[0].simulator.aircraft.effects
-    moved = set(cause["parameters"]) - {"throttle"}
-    if cause["effect"] != "command_delay" or not moved or "damping" in effects.get("actuator_lag", {}):
-        return rivals
-    return [*rivals, "a servo of second order that is as late"]
 
 
 def _parameter(name: str, value: float, error: float, unit: str) -> str:
