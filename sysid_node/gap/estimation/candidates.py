@@ -60,6 +60,10 @@ TIME_EFFECTS = frozenset(
 #: Of these, the effects that delay the response to commands: each is always compared with the others.
 RESPONSE_DELAYS = frozenset({"actuator_lag", "command_delay", "imu_delay", "actuator_stamp_delay"})
 
+#: Widths of a free play from which fits start, as shares of the command's travel. What is left has several minima over
+#: the width: a play that is half as wide as the true one turns the surface back at the wrong instants.
+_PLAYS = (0.1, 0.25, 0.5)
+
 #: Onsets from which fits start, as shares of the flight's duration.
 _ONSETS = (0.15, 0.3, 0.45, 0.6, 0.75)
 
@@ -144,7 +148,9 @@ def _shapes(
         speed = float(np.max([_fastest(model) for model in models]))
         yield "inverse_rate", tuple(1.0 / (max(speed, 0.1) * share) for share in (0.6, 0.3, 0.15, 0.07))
     if effect == "actuator_backlash":
-        yield "width", tuple(_believed(simulator, effect) + more for more in (0.01, 0.03))
+        moved = _travel(models)
+        least = float(moved[moved > 0.0].min(initial=0.2))
+        yield "width", tuple(_believed(simulator, effect) + share * least for share in _PLAYS)
     if effect in TIME_EFFECTS:
         believed = _believed(simulator, effect)
         name = "delay" if effect.endswith("delay") else "time_constant"
@@ -166,6 +172,11 @@ def _fastest(model: ResidualModel) -> Array:
     return np.asarray(np.abs(np.diff(model.commands[:, :-1], axis=0)).max(axis=0) * model.simulator.rate)
 
 
+def _travel(models: Sequence[ResidualModel]) -> Array:
+    """How far each command (controls,) goes to either side of its middle, rad."""
+    return np.asarray(np.max([0.5 * np.ptp(model.commands[:, :-1], axis=0) for model in models], axis=0))
+
+
 def _variants(simulator: Simulator, models: Sequence[ResidualModel], effect: str) -> list[Candidate]:
     """The candidates of one control alone, for each that moves, and of each of them by itself.
 
@@ -177,10 +188,13 @@ def _variants(simulator: Simulator, models: Sequence[ResidualModel], effect: str
         return []
     indices = tuple(simulator.names.index(f"{effect}.{control}") for control in controls)
     by_speed = {c: 1.0 / max(float(s), 0.1) for c, s in zip(simulator.layout.controls, speeds, strict=True)}
-    usual = (0.01, 0.03) if effect == "actuator_backlash" else (0.03, 0.1)  # rad, s
+    travel = dict(zip(simulator.layout.controls, _travel(models), strict=True))
     starts = [
-        [by_speed[c] / share for share in (0.4, 0.1)] if effect == "actuator_rate_limit" else [*usual] for c in controls
-    ]
+        [by_speed[c] / share for share in (0.4, 0.1)] if effect == "actuator_rate_limit"
+        else [float(travel[c]) * share for share in _PLAYS] if effect == "actuator_backlash"
+        else [0.03, 0.1]
+        for c in controls
+    ]  # fmt: skip
     alone = [
         Candidate(effect, f"{effect} of {control}", (index,), tuple((start,) for start in own))
         for control, index, own in zip(controls, indices, starts, strict=True)

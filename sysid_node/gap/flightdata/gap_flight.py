@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import fftconvolve, firwin
+from scipy.signal import fftconvolve
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
@@ -25,8 +25,9 @@ from sysid_node.gap.flightdata.thrust import thrust_missing, with_inferred_thrus
 #: Rate at which forces are predicted, Hz: more than ten times the highest frequency that is compared.
 ANALYSIS_RATE = 50.0
 
-#: Corner of the zero-phase low-pass before flights are resampled, Hz. It is flat to 6 Hz. Commands pass it, too, so
-#: that a linear chain stays the same.
+#: Frequency at which the zero-phase low-pass before flights are resampled has a gain of 0.707, Hz. Commands pass it,
+#: too, so that a linear chain stays the same. It is Gaussian, because a step must not overshoot: a free play would hold
+#: the surface where the overshoot has taken it, and a rate limit would answer to slopes that were not commanded.
 _CORNER = 11.0
 
 #: Shortest flight that can be diagnosed, s: three windows of at least a short period each.
@@ -190,10 +191,13 @@ def _slope(values: Array, rate: float) -> Array:
 
 
 def _low_pass(rate: float) -> Array:
-    """Taps of the linear-phase low-pass, a quarter of a second to each side; one tap where the rate is too low."""
+    """Taps of the Gaussian low-pass, five standard deviations to each side; one tap where the rate is too low."""
     if rate <= 2.2 * _CORNER:
         return np.ones(1)
-    taps: Array = firwin(2 * round(0.25 * rate) + 1, _CORNER, fs=rate)
+    spread = np.sqrt(np.log(2.0)) / (2.0 * np.pi * _CORNER)  # s, of a Gaussian whose gain is 0.707 at the corner
+    half = int(5.0 * spread * rate)
+    taps: Array = np.exp(-0.5 * (np.arange(-half, half + 1) / (rate * spread)) ** 2)
+    taps /= taps.sum()
     return taps
 
 

@@ -21,6 +21,9 @@ from sysid_node.gap.residuals.parameter_priors import bounds
 from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
 
+#: Effects that change the shape of what the surfaces do, so that derivatives have other slopes where they start.
+_RESHAPES_COMMANDS = frozenset({"actuator_backlash"})
+
 
 class Screened(NamedTuple):
     """A candidate that was screened: the deviance that it leaves, and the values from which its fit starts."""
@@ -59,14 +62,20 @@ def screened(fit: CandidateFit, problem: VariableProjection, candidate: Candidat
     extended = problem.with_candidate(candidate)
     for start in candidate.starts:
         values = np.concatenate([fit.values, start])
-        residual = extended.residual_and_slopes(values)
-        step = np.linalg.lstsq(extended.jacobian(values), -residual, rcond=None)[0]
+        there = _linearised_at(fit, candidate, start) if candidate.effect in _RESHAPES_COMMANDS else extended
+        residual = there.residual_and_slopes(values)
+        step = np.linalg.lstsq(there.jacobian(values), -residual, rcond=None)[0]
         stepped = np.clip(values + step, low, high)
         for tried in (values, stepped):
-            deviance = extended.deviance(tried)
+            deviance = there.deviance(tried)
             if deviance < best.deviance:
                 best = Screened(deviance, candidate, tuple(tried[fit.values.size :].tolist()))
     return _with_derivatives_released(fit, problem, best)
+
+
+def _linearised_at(fit: CandidateFit, candidate: Candidate, start: tuple[float, ...]) -> VariableProjection:
+    """The problem with the slopes of the nuisance parameters where the candidate starts."""
+    return VariableProjection(with_candidates(fit, [*fit.candidates, candidate], fit.nuisances, start))
 
 
 def _with_derivatives_released(fit: CandidateFit, problem: VariableProjection, found: Screened) -> Screened:

@@ -45,19 +45,35 @@ def test_angular_accelerations_are_the_derivatives_of_the_rates(aircraft, time) 
     omega = 2.0 * np.pi * 2.0
     record = resampled(flight_with(aircraft, q=np.sin(omega * time)))
     inner = slice(25, -25)
-    expected = omega * np.cos(omega * record.time)
+    expected = gain(2.0) * omega * np.cos(omega * record.time)
     np.testing.assert_allclose(record["q_rate"][inner], expected[inner], atol=2e-3 * omega)
 
 
-@pytest.mark.parametrize(("frequency", "passed"), [(0.5, 1.0), (4.0, 1.0), (20.0, 0.0)])
-def test_what_is_compared_passes_the_low_pass_without_delay_and_the_rest_does_not(
-    aircraft, time, frequency: float, passed: float
+def gain(frequency: float) -> float:
+    """Of the Gaussian low-pass, 1 / sqrt(2) at 11 Hz."""
+    return float(2.0 ** (-0.5 * (frequency / 11.0) ** 2))
+
+
+@pytest.mark.parametrize("frequency", [0.5, 4.0, 20.0])
+def test_a_sine_passes_the_low_pass_without_delay_and_with_the_gain_of_a_gaussian(
+    aircraft, time, frequency: float
 ) -> None:
     sine = np.sin(2.0 * np.pi * frequency * time)
     record = resampled(flight_with(aircraft, q=sine))
     inner = slice(25, -25)
-    expected = passed * np.sin(2.0 * np.pi * frequency * record.time)
-    np.testing.assert_allclose(record["q"][inner], expected[inner], atol=0.01)
+    expected = gain(frequency) * np.sin(2.0 * np.pi * frequency * record.time)
+    np.testing.assert_allclose(record["q"][inner], expected[inner], atol=1e-3)
+
+
+def test_what_the_analysis_rate_folds_into_the_band_is_taken_out(aircraft, time) -> None:
+    record = resampled(flight_with(aircraft, q=np.sin(2.0 * np.pi * 47.0 * time)))
+    assert np.abs(record["q"][25:-25]).max() < 2.0 * gain(47.0) < 0.004
+
+
+def test_a_step_does_not_overshoot(aircraft, time) -> None:
+    """A free play would hold the surface where an overshoot has taken it."""
+    record = resampled(flight_with(aircraft, de=np.where(time > 5.0, 0.1, 0.0)))
+    assert record["de"].min() > -1e-9 and record["de"].max() < 0.1 + 1e-9
 
 
 def test_the_time_base_is_regular(aircraft) -> None:

@@ -31,6 +31,13 @@ def oscillating(aircraft) -> Fitted:
     return _fitted(aircraft, effect, 15, ("command_delay", "actuator_lag", SECOND_ORDER))
 
 
+@pytest.fixture(scope="module")
+def loose(aircraft) -> Fitted:
+    """As ``late``, with a free play of 0.08 rad at the rudder."""
+    wanted = ("actuator_backlash", "actuator_backlash of rudder", "actuator_backlash of each control", "imu_scale")
+    return _fitted(aircraft, {"actuator_backlash": {"rudder": 0.08}}, 16, wanted)
+
+
 def _fitted(aircraft, effects: Mapping[str, Mapping[str, float]], seed: int, wanted: tuple[str, ...]) -> Fitted:
     model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, effects, seed=seed))
     nuisances = nuisances_of(aircraft, model)

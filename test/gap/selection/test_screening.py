@@ -73,3 +73,10 @@ def test_another_mass_is_seen_although_derivatives_have_gone_to_their_limits(air
     found = screened(fit, problem, mass)
     assert found.start[0] == pytest.approx(0.5, rel=0.3)
     assert found.deviance < problem.deviance(np.empty(0)) - 20.0
+
+
+def test_a_wide_free_play_is_found_behind_the_minima_of_narrow_ones(loose) -> None:
+    fitter, base, candidates = loose
+    best = fitter.screen_upon([base], list(candidates.values()), lambda share, text: None)[0].screened
+    assert best.candidate.label == "actuator_backlash of rudder"
+    assert best.start == pytest.approx([0.08], rel=0.2)
