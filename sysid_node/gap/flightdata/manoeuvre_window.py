@@ -37,8 +37,8 @@ def cut_to_manoeuvre(flight: GapFlight, controls: tuple[str, ...]) -> GapFlight:
     limits = THRESHOLDS.manoeuvre
     aside = 0.5 * (1.0 - limits.share_of_changes)
     first, last = np.searchsorted(power / power[-1], [aside, 1.0 - aside]) / ANALYSIS_RATE
-    begin = max(first - limits.before, 0.0)
     end = min(max(last + limits.after, first - limits.before + SHORTEST_FLIGHT), record.duration)
+    begin = max(min(first - limits.before, end - SHORTEST_FLIGHT), 0.0)
     kept = (record.time >= begin) & (record.time <= end)
     elsewhere = commands[~kept].var(axis=0) > limits.elsewhere * commands[kept].var(axis=0)
     if end - begin > limits.share_of_flight * record.duration or elsewhere.any():

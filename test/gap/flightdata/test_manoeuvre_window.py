@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from gap_flights import fly
 
+from sysid_node.gap.flightdata.gap_flight import SHORTEST_FLIGHT
 from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre, step_changes
 
 CONTROLS = ("de", "da", "dr")
@@ -18,6 +19,13 @@ def test_the_only_manoeuvre_is_kept_with_what_rings_after_it(aircraft) -> None:
     assert cut.left_out == pytest.approx(flight.record.duration - cut.record.duration, abs=0.05)
     assert abs(cut.record["de"]).max() == abs(flight.record["de"]).max()
     assert (cut.record.start_ns - flight.record.start_ns) * 1e-9 == pytest.approx(18.0, abs=0.5)
+
+
+def test_a_manoeuvre_at_the_end_keeps_enough_before_it(aircraft) -> None:
+    flight = fly(aircraft, {}, manoeuvre=["doublet:elevator:start=47:width=0.3"], duration=50.0)
+    cut = cut_to_manoeuvre(flight, CONTROLS)
+    assert cut.record.duration == pytest.approx(SHORTEST_FLIGHT, abs=0.05)
+    assert abs(cut.record["de"]).max() == abs(flight.record["de"]).max()
 
 
 def test_manoeuvres_all_over_a_flight_are_kept(aircraft) -> None:
