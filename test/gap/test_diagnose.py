@@ -1,12 +1,19 @@
 """What is put in is found again, by name and size, through derivatives that are wrong; truth: the effects flown."""
 
+from dataclasses import replace
+
 import pytest
 from gap_flights import fly
 
+from sysid_node.aircraft.dump import dump_aircraft
+from sysid_node.aircraft.load import parse_aircraft
+from sysid_node.aircraft.model import UncertainValue
 from sysid_node.errors import InputError
+from sysid_node.gap.correction import corrected_aircraft
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
 from sysid_node.report.pages.gap_page import write_gap_report
+from sysid_node.report.sections.gap.paragraph import paragraph
 
 
 def test_a_lag_is_named_with_its_size(lagging) -> None:
@@ -31,6 +38,21 @@ def test_its_report_is_drawn_and_fits_every_width(lagging, tmp_path, browse, fit
     assert page.complaints == []
     assert page.drawn == page.plots > len(lagging.simulation_gap.per_channel)
     fit_everywhere(report)
+
+
+def test_one_servo_slower_than_the_file_says_is_named_and_the_corrected_file_leaves_no_gap(aircraft) -> None:
+    servos = dict.fromkeys(aircraft.controls, UncertainValue(0.03, 0.006))
+    stated = replace(aircraft, effects={"actuator_lag": servos})
+    flown = {"actuator_lag": {"elevator": 0.12, "aileron": 0.03, "rudder": 0.03}}
+    flights = [fly(stated, flown, seed=seed) for seed in (21, 22)]
+    first = diagnose(stated, flights[:1], flights[1:])
+    (cause,) = document(first)["causes"]
+    assert (first.verdict, cause["label"]) == ("explained", "actuator_lag of elevator")
+    assert cause["parameters"]["elevator"][0] == pytest.approx(0.12, rel=0.1)
+    assert cause["believed"] == {"elevator": pytest.approx(0.03)}
+    assert "the aircraft file says elevator 0.0300 s" in paragraph(first)
+    corrected = parse_aircraft(dump_aircraft(corrected_aircraft(first)))
+    assert diagnose(corrected, flights[:1], flights[1:]).verdict == "no_gap"
 
 
 def test_tolerances_are_no_gap(aircraft, wrong_derivatives) -> None:
