@@ -22,6 +22,26 @@ def test_a_late_imu_is_no_weather(late) -> None:
     assert not is_gusty(late)
 
 
+@pytest.mark.parametrize(
+    ("effect", "parameter", "value"),
+    [
+        ("imu_bias", "q", 0.018),
+        ("imu_bias", "az", 0.4),
+        ("imu_lever_arm", "x", 0.15),
+        ("imu_misalignment", "pitch", 0.05),
+        ("vane_bias", "alpha", 0.03),
+        ("vane_scale", "beta", 0.15),
+        ("vane_lever_arm", "x", 0.3),
+        ("airspeed_scale", "error", 0.1),
+        ("air_data_lag", "time_constant", 0.08),
+    ],
+)
+def test_still_air_is_still_with_one_instrument_off(aircraft, effect: str, parameter: str, value: float) -> None:
+    model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, {effect: {parameter: value}}, seed=31))
+    assert not is_gusty(model)
+    assert model.gusts < 0.004 * model.record["V"].mean()
+
+
 def test_weather_is_no_instruments_error(aircraft) -> None:
     blown = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, {}, seed=12, turbulence="light"))
     assert is_gusty(blown)
