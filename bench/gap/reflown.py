@@ -229,7 +229,9 @@ def _counts(cases: list[dict[str, Any]]) -> str:
 def _row(case: Mapping[str, Any]) -> list[str]:
     effects = [f"{name} {key} {value:.3g}" for name, v in case["true_sizes"].items() for key, value in v.items()]
     effects += [f"{name} {value:.2g}" for name, value in case["unlisted"].items()]
-    head = [str(case["seed"]), case["aircraft"], case["way"], case["turbulence"], "; ".join(effects) or "nothing"]
+    error = case.get("surrogate_error")
+    way = case["way"] if error is None else f"{case['way']}, known to {100.0 * error:.0f} %"
+    head = [str(case["seed"]), case["aircraft"], way, case["turbulence"], "; ".join(effects) or "nothing"]
     if "failed" in case:
         return [*head, f"not flown: {case['failed']}", "", "", "", "", ""]
     causes = "; ".join("/".join([c["label"], *c["indistinguishable_from"][:2]]) + f" ({c['probability']:.2f})"
