@@ -1,29 +1,36 @@
 """Lookup tables for what derivatives and effects leave of a simulator's coefficients.
 
 The residual of a coefficient is regressed on piecewise linear functions of one variable after another, together with
-the coefficient's derivatives, which take the straight part. A table is kept where it predicts simulated flight that was
-not fitted clearly better.
+the coefficient's derivatives, which take the straight part. Airspeed and throttle are also tried together: the thrust
+of a propeller depends on both, and either alone may explain next to nothing. Tables are kept where they predict
+simulated flight that was not fitted clearly better.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import isfinite
 
+import jax.numpy as jnp
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft, LookupTable
 from sysid_node.aircraft.names import split_derivative
+from sysid_node.dynamics.tables import full_thrust
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.residual_model import COEFFICIENTS, ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import MARGIN
+from sysid_node.sim.effects.actuator_lag import first_order_series
 
 #: Points of a table, and the percentiles of the variable between which they lie.
 _POINTS, _ENDS = 7, (0.5, 99.5)
 
-#: Tables of one coefficient, at most.
+#: Times that tables are added to one coefficient, at most.
 _MOST = 2
+
+#: Variables by which no derivative of the file need be: V is m/s, the throttle 0 to 1, with the motor's lag.
+_OF_THRUST = ("V", "throttle")
 
 #: Share of what is left of a coefficient that a table must remove on flight not fitted, and the least error (rms) that
 #: this must be, as a share of the motion.
@@ -33,12 +40,14 @@ _SHARE, _LEAST = 0.2, 0.006
 _RIDGE, _SMOOTHNESS = 1e-6, 1e-5
 
 
-class Residual(NamedTuple):
+@dataclass(frozen=True)
+class Residual:
     """What a point of the parameters leaves of flights' coefficients, in the time domain, N samples in all."""
 
     left: Array  # (N, 6)
     slopes: Array  # (N, 6, D) by each derivative
     measured: Array  # (N, 6)
+    thrust: Mapping[str, Array] = field(default_factory=dict)  # (N,) airspeed and throttle, where both are known
 
 
 @dataclass(frozen=True)
@@ -65,8 +74,20 @@ def residual_of(models: Sequence[ResidualModel], points: Sequence[Array]) -> Res
         inner = slice(round(MARGIN * model.simulator.rate), -round(MARGIN * model.simulator.rate))
         predicted = model.predicted_series(point)[:, : len(COEFFICIENTS)]
         measured = model.series[:, : len(COEFFICIENTS)]
-        parts.append(((measured - predicted)[inner], model.series_by_derivative(point)[inner], measured[inner]))
-    return Residual(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+        left, slopes, thrust = measured - predicted, model.series_by_derivative(point), _thrust(model, point)
+        parts.append([each[inner] for each in (left, slopes, measured, thrust)])
+    left, slopes, measured, thrust = (np.concatenate(part) for part in zip(*parts, strict=True))
+    known = isfinite(full_thrust(models[0].simulator.aircraft)) and all(model.flight.metered for model in models)
+    return Residual(left, slopes, measured, dict(zip(_OF_THRUST, thrust.T, strict=True)) if known else {})
+
+
+def _thrust(model: ResidualModel, point: Array) -> Array:
+    """(N, 2) airspeed, m/s, and throttle, 0 to 1, behind the motor's lag at parameters (P,)."""
+    simulator = model.simulator
+    lag = point[simulator.names.index("motor_lag.time_constant")]
+    share = jnp.asarray(model.commands[:, -1] / full_thrust(simulator.aircraft))
+    throttle = first_order_series(jnp.asarray(lag), share, jnp.asarray(simulator.step), share[0])
+    return np.column_stack([model.record["V"], np.asarray(throttle)])
 
 
 def curves(aircraft: Aircraft, fitted: Residual, held_out: Residual) -> list[TableCurve]:
@@ -79,17 +100,20 @@ def curves(aircraft: Aircraft, fitted: Residual, held_out: Residual) -> list[Tab
     ]
 
 
-class _Single(NamedTuple):
+@dataclass(frozen=True)
+class _Single:
     """One coefficient of a ``Residual``."""
 
     left: Array  # (N,)
     slopes: Array  # (N, D)
     variables: Array  # (N, 6, D): what multiplies each derivative
     measured: Array  # (N,)
+    thrust: Mapping[str, Array]
 
 
 def _of(residual: Residual, place: int) -> _Single:
-    return _Single(residual.left[:, place], residual.slopes[:, place], residual.slopes, residual.measured[:, place])
+    left, slopes, measured = residual.left[:, place], residual.slopes[:, place], residual.measured[:, place]
+    return _Single(left, slopes, residual.slopes, measured, residual.thrust)
 
 
 def _curves_of(
@@ -104,10 +128,10 @@ def _curves_of(
     best = _power_after(own, [], fitted, held_out, names)[0]
     for _ in range(_MOST):
         tried = [
-            _power_after(own, [*chosen, curve], fitted, held_out, names)
-            for variable in _variables(aircraft)
-            if variable not in {c.variable for c in chosen}
-            and (curve := _empty(coefficient, variable, _series(variable, fitted, names))) is not None
+            _power_after(own, [*chosen, *added], fitted, held_out, names)
+            for variables in _variables(aircraft)
+            if not {c.variable for c in chosen} & {*variables}
+            and (added := _empty_tables(coefficient, variables, fitted, names))
         ]
         if not tried:
             break
@@ -118,18 +142,29 @@ def _curves_of(
     return chosen
 
 
-def _variables(aircraft: Aircraft) -> tuple[str, ...]:
-    """Variables over which tables are tried."""
-    return ("alpha", "beta", *aircraft.control_symbols)
+def _variables(aircraft: Aircraft) -> list[tuple[str, ...]]:
+    """Variables over which tables are tried: each alone, and those of the thrust together."""
+    return [*((name,) for name in ("alpha", "beta", *aircraft.control_symbols, *_OF_THRUST)), _OF_THRUST]
 
 
 def _series(variable: str, single: _Single, names: Sequence[str]) -> Array | None:
     """A variable (N,): the slope of a coefficient by its derivative with respect to the variable."""
+    if variable in _OF_THRUST:
+        return single.thrust.get(variable)
     for i, name in enumerate(names):
         coefficient, regressor = split_derivative(name)
         if regressor == variable:
             return np.asarray(single.variables[:, COEFFICIENTS.index(coefficient), i])
     return None
+
+
+def _empty_tables(
+    coefficient: str, variables: Sequence[str], single: _Single, names: Sequence[str]
+) -> list[TableCurve]:
+    """A table of zeros over each variable; none at all where one is not known or does not move."""
+    tables = [_empty(coefficient, variable, _series(variable, single, names)) for variable in variables]
+    found = [table for table in tables if table is not None]
+    return found if len(found) == len(tables) else []
 
 
 def _empty(coefficient: str, variable: str, series: Array | None) -> TableCurve | None:
@@ -160,12 +195,13 @@ def _power_after(
     other = [held_out.slopes[:, own], *(_hats(c.points, _series(c.variable, held_out, names)) for c in tables)]
     power = float(np.mean((held_out.left - np.hstack(other) @ values) ** 2))
     parts = [values[len(own) + k * _POINTS : len(own) + (k + 1) * _POINTS] for k in range(len(tables))]
-    return power, [replace(c, values=_bent(c.points, v)) for c, v in zip(tables, parts, strict=True)]
+    return power, [replace(c, values=_bent(c, v)) for c, v in zip(tables, parts, strict=True)]
 
 
-def _bent(points: Array, values: Array) -> Array:
-    """The values (K,) without their straight part, which belongs to the derivatives."""
-    return np.asarray(values - np.polyval(np.polyfit(points, values, 1), points))
+def _bent(curve: TableCurve, values: Array) -> Array:
+    """The values (K,) without what belongs to the derivatives: their straight part, of thrust their mean."""
+    straight = np.polyfit(curve.points, values, 0 if curve.variable in _OF_THRUST else 1)
+    return np.asarray(values - np.polyval(straight, curve.points))
 
 
 def _hats(points: Array, series: Array | None) -> Array:

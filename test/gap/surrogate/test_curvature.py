@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,3 +50,28 @@ def test_a_kink_that_other_flight_does_not_show_gives_no_table() -> None:
 def test_the_table_has_no_straight_part() -> None:
     (found,) = curves(AIRCRAFT, residual(-0.5, 1), residual(-0.5, 2))
     assert np.polyfit(found.points, found.values, 1) == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def in_thrust(seed: int) -> Residual:
+    """What a propeller's thrust leaves of the drag: it falls with the airspeed, and an autopilot adds throttle then."""
+    plain, random = residual(0.0, seed), np.random.default_rng(100 + seed)
+    slow, other = random.standard_normal((2, 3000))
+    V, throttle = 20.0 - slow, 0.5 + 0.1 * slow + 0.02 * other
+    left = plain.left.copy()
+    left[:, COEFFICIENTS.index("CD")] += 0.02 * (V - 20.0) + 0.2 * (throttle - 0.5)
+    return replace(plain, left=left, measured=left + plain.slopes.sum(axis=2), thrust={"V": V, "throttle": throttle})
+
+
+def test_airspeed_and_throttle_are_found_together_though_each_alone_explains_little() -> None:
+    first, second = in_thrust(1), in_thrust(2)
+    found = curves(AIRCRAFT, first, second)
+    assert [(curve.coefficient, curve.variable) for curve in found] == [("CD", "V"), ("CD", "throttle")]
+    slopes = [np.polyfit(curve.points, curve.values, 1)[0] for curve in found]
+    assert slopes == pytest.approx([0.02, 0.2], rel=0.1)
+    alone = replace(first, thrust={"V": first.thrust["V"]}), replace(second, thrust={"V": second.thrust["V"]})
+    assert curves(AIRCRAFT, *alone) == []
+
+
+def test_without_metered_thrust_there_is_no_table_over_it() -> None:
+    first, second = (replace(in_thrust(seed), thrust={}) for seed in (1, 2))
+    assert curves(AIRCRAFT, first, second) == []
