@@ -24,6 +24,9 @@ _STRUCTURAL_FREQUENCY = ("structural_mode", "frequency")
 #: Farthest that an instrument may be off its place, in spans: a nose boom is shorter than a fuselage.
 _FARTHEST = {"vane_lever_arm": 1.5, "imu_lever_arm": 1.0}
 
+#: Damping of a servo of second order. With more of it, a lag of first order describes the servo as well.
+_SERVO_DAMPING = (0.3, 1.5)
+
 #: Standard deviation of an onset's prior, s: it may lie at any time of the flight.
 _ONSET_SIGMA = 100.0
 
@@ -43,6 +46,8 @@ def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
         if effect in _FARTHEST:  # of the file's place, in spans
             room = _FARTHEST[effect] * simulator.aircraft.geometry.b
             lower[place], upper[place] = max(lower[place], -room), min(upper[place], room)
+        elif (effect, table[place][1].name) == ("actuator_lag", "damping") and not simulator.neutral()[indices[place]]:
+            lower[place], upper[place] = _SERVO_DAMPING
     for place, (effect, parameter) in enumerate(table):
         shared = EFFECTS[effect].shared
         if shared and parameter.name in (*simulator.layout.controls, THROTTLE):  # the sum with the shared is bounded

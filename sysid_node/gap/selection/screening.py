@@ -102,12 +102,15 @@ def best_screened(pairs: Sequence[ScreenedPair], most: int, thresholds: Threshol
     second variant of an effect that all controls may share takes no room.
     """
     counts: Counter[tuple[int, str]] = Counter()
+    seen: set[tuple[int, str]] = set()
     kept = []
     for pair in _likely_variants(pairs, thresholds):
-        explanation, effect = id(pair.explanation), pair.screened.candidate.effect
-        if counts[explanation, ""] < most and counts[explanation, effect] < thresholds.search.per_effect:
-            again = effect in SHARED and counts[explanation, effect] > 0
-            counts.update([(explanation, effect), *([] if again else [(explanation, "")])])
+        explanation, candidate = id(pair.explanation), pair.screened.candidate
+        law = _law(candidate)
+        if counts[explanation, ""] < most and counts[explanation, law] < thresholds.search.per_effect:
+            again = candidate.effect in SHARED and (explanation, candidate.effect) in seen
+            counts.update([(explanation, law), *([] if again else [(explanation, "")])])
+            seen.add((explanation, candidate.effect))
             kept.append(pair)
     return kept
 
@@ -131,17 +134,20 @@ def _likely_variants(pairs: Sequence[ScreenedPair], thresholds: Thresholds) -> l
     return [pair for pair in pairs if not _is_variant(pair.screened.candidate) or id(pair) in chosen]
 
 
+def _law(candidate: Candidate) -> str:
+    """The effect of a candidate; a lag of second order has another law than those of first."""
+    return candidate.label if candidate.label == SECOND_ORDER else candidate.effect
+
+
 def _varied(candidate: Candidate) -> str:
     """What a candidate is a variant of: its effect, and of wrong derivatives the coefficient."""
     coefficient = candidate.scope.partition("_")[0] if candidate.effect == DERIVATIVE_ERROR else ""
-    return f"{candidate.effect} {coefficient}"
+    return f"{_law(candidate)} {coefficient}"
 
 
 def _is_variant(candidate: Candidate) -> bool:
     """Whether a candidate is tried only where it is the best of those of its kind."""
-    if candidate.effect == DERIVATIVE_ERROR or candidate.label == SECOND_ORDER:
-        return True
-    return candidate.effect in SHARED and bool(candidate.scope)
+    return candidate.effect == DERIVATIVE_ERROR or (candidate.effect in SHARED and bool(candidate.scope))
 
 
 def with_found_onsets(candidates: Sequence[Candidate], found: Sequence[Screened]) -> list[Candidate]:

@@ -47,8 +47,14 @@ def test_instruments_may_be_off_their_place_in_proportion_to_the_span(aircraft) 
     assert large.scales[large.names.index("mass_error.error")] == small.scales[small.names.index("mass_error.error")]
 
 
-def test_every_neutral_value_but_a_jam_and_a_mode_lies_within_its_bounds(simulator) -> None:
-    indices = [i for i, name in enumerate(simulator.names) if not name.startswith(("stuck_surface", "structural_mode"))]
+def test_a_servo_of_second_order_has_a_damping_that_servos_have(simulator) -> None:
+    low, high = bounds(simulator, [simulator.names.index("actuator_lag.damping")])
+    assert (low[0], high[0]) == (0.3, 1.5)
+
+
+def test_every_neutral_value_but_of_a_jam_a_mode_and_a_damping_lies_within_its_bounds(simulator) -> None:
+    apart = ("stuck_surface", "structural_mode", "actuator_lag.damping")
+    indices = [i for i, name in enumerate(simulator.names) if not name.startswith(apart)]
     low, high = bounds(simulator, indices)
     neutral = simulator.neutral()[indices]
     assert ((low <= neutral) & (neutral <= high)).all()
