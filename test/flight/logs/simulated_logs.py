@@ -28,6 +28,13 @@ SERVOS = {
 }
 MAX_THRUST = 30.0
 
+#: The outputs of other aircraft: a flying wing with a rudder, and a V-tail; of each pair one output is reversed.
+LAYOUTS = {
+    "ailerons": SERVOS,
+    "elevons": {**SERVOS, 1: (77, 1100, 1900, 1500, 0), 2: (78, 1000, 2000, 1480, 1)},
+    "V-tail": {**SERVOS, 2: (79, 1000, 2000, 1480, 1), 4: (80, 900, 2100, 1500, 0)},
+}
+
 Rates = Mapping[str, float]
 FULL_RATES = {"imu": 100.0, "attitude": 100.0, "airspeed": 50.0, "air": 20.0, "controls": 100.0}
 PX4_DEFAULT = {"imu": 100.0, "attitude": 20.0, "airspeed": 5.0, "air": 5.0, "controls": 10.0}
@@ -159,9 +166,12 @@ def dataflash_log(
     flying: int = 1,
     start: datetime.datetime | None = None,
     board: str = "",
+    layout: str = "ailerons",
+    mixing: Mapping[str, float] | None = None,
 ) -> FlightRecord:
     """A DataFlash log of the flight, with a second IMU that is wrong and not the primary.
 
+    ``layout`` is one of ``LAYOUTS``, and ``mixing`` the parameters MIXING_*, of which a log without them has none.
     ``start`` is the GPS receiver's time at the first message and ``board`` the line with the board's number.
     """
     record = flight()
@@ -170,12 +180,13 @@ def dataflash_log(
     motion = np.column_stack([record[name] for name in ("p", "q", "r", "ax", "ay", "az")])
     degrees = np.degrees(np.column_stack([record[name] for name in ("phi", "theta", "psi")]))
     equivalent = record["V"] * np.sqrt(record["rho"] / 1.225)
-    pulses = pulses_of(fractions(record))
+    pulses = pulses_of(fractions(record), layout, mixing or {})
+    parameters = {**_ardupilot_parameters(layout), **(mixing or {})}
     kelvin = 288.15
     rows = {
         "MSG": [(us[0], f"{firmware} (abcd)"), *([(us[0], board)] if board else [])],
         "GPS": [] if start is None else [(us[0], *_gps_time(start))],
-        "PARM": [(us[0], name, value) for name, value in _ardupilot_parameters().items()],
+        "PARM": [(us[0], name, value) for name, value in parameters.items()],
         "STAT": [(us[0], flying, 1)],
         "MODE": [(us[0], 5, 5)],
         "XKF4": [(us[0], 0, 1)],
@@ -200,11 +211,27 @@ def _gps_time(date: datetime.datetime) -> tuple[int, int]:
     return round(1e3 * (seconds % 604800)), int(seconds // 604800)
 
 
-def pulses_of(commands: np.ndarray) -> np.ndarray:
-    """Pulses (N, 4), us, of the outputs 1 to 4, as ArduPilot computes them from roll, pitch, throttle and yaw."""
+def mixed(commands: np.ndarray, layout: str, mixing: Mapping[str, float]) -> np.ndarray:
+    """Scaled outputs 1 to 4 (N, 4) from roll, pitch, yaw and throttle, by ArduPlane's ``channel_function_mixer``."""
+    roll, pitch, yaw, throttle = commands.T
+    other = yaw if layout == "V-tail" else roll
+    gain, offset = mixing.get("MIXING_GAIN", 0.5), mixing.get("MIXING_OFFSET", 0.0)
+    first = other * (100 + offset) * 0.01 if offset > 0 else other
+    second = pitch * (100 - offset) * 0.01 if offset < 0 else pitch
+    less, more = (np.clip(gain * (second + sign * first), -1.0, 1.0) for sign in (-1, 1))
+    columns = {
+        "ailerons": [roll, pitch, throttle, yaw],
+        "elevons": [less, more, throttle, yaw],
+        "V-tail": [roll, more, throttle, less],
+    }
+    return np.column_stack(columns[layout])
+
+
+def pulses_of(commands: np.ndarray, layout: str = "ailerons", mixing: Mapping[str, float] | None = None) -> np.ndarray:
+    """Pulses (N, 4), us, of the outputs 1 to 4, as ArduPilot computes them from roll, pitch, yaw and throttle."""
     columns = []
-    for number, command in zip((1, 2, 3, 4), commands[:, [0, 1, 3, 2]].T, strict=True):
-        function, low, high, trim, turned = SERVOS[number]
+    for number, command in zip((1, 2, 3, 4), mixed(commands, layout, mixing or {}).T, strict=True):
+        function, low, high, trim, turned = LAYOUTS[layout][number]
         if function == 70:
             columns.append(low + command * (high - low))
         else:
@@ -213,6 +240,7 @@ def pulses_of(commands: np.ndarray) -> np.ndarray:
     return np.round(np.column_stack(columns)).astype(int)
 
 
-def _ardupilot_parameters() -> dict[str, float]:
+def _ardupilot_parameters(layout: str) -> dict[str, float]:
     keys = ("FUNCTION", "MIN", "MAX", "TRIM", "REVERSED")
-    return {f"SERVO{n}_{key}": float(value) for n, row in SERVOS.items() for key, value in zip(keys, row, strict=True)}
+    rows = LAYOUTS[layout].items()
+    return {f"SERVO{n}_{key}": float(value) for n, row in rows for key, value in zip(keys, row, strict=True)}

@@ -22,6 +22,18 @@ def test_the_flight_comes_back(tmp_path):
     assert not back.measured("alpha"), "AOA is an estimate of the attitude filter"
 
 
+@pytest.mark.parametrize("layout", ["elevons", "V-tail"])
+@pytest.mark.parametrize("mixing", [None, {"MIXING_GAIN": 0.6, "MIXING_OFFSET": -50.0}])
+def test_mixed_surfaces_come_back_as_controls(tmp_path, layout, mixing):
+    """Truth: the record. Two pulses known to 0.5 us of 400, through a gain of 0.5, give 0.0025 of 0.5 rad."""
+    record = dataflash_log(tmp_path / "flight.bin", layout=layout, mixing=mixing)
+    back = load_flight_record(tmp_path / "flight.bin", aircraft())
+    at = np.searchsorted(record.time, record.time[0] + back.time + 1e-4) - 1
+    for name in ("de", "da", "dr"):
+        np.testing.assert_allclose(back[name], record[name][at], atol=1.3e-3, err_msg=name)
+        assert np.ptp(record[name]) > 0.1
+
+
 def test_the_primary_imu_and_the_estimated_angle_of_attack_are_said(tmp_path):
     dataflash_log(tmp_path / "flight.bin")
     flight = open_log(tmp_path / "flight.bin")

@@ -1,5 +1,5 @@
 """Commands of the controls from ArduPilot's servo outputs, by ``SERVOn_FUNCTION``, ``_MIN``, ``_MAX``, ``_TRIM`` and
-``_REVERSED``."""
+``_REVERSED``, of elevons and V-tails by ``MIXING_GAIN`` and ``MIXING_OFFSET``, too."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from sysid_node.flight.logs.autopilot_log import LoggedCommands, Signal, absent
-from sysid_node.flight.logs.readers.mixing import SIGNS, unmixed
+from sysid_node.flight.logs.readers.mixing import SIGNS, at_full_stick, unmixed
 from sysid_node.flight.record import Array
 
 #: Kinds of surfaces by SERVOn_FUNCTION (ArduPilot, ``SRV_Channel.h``). A flaperon moves as a single aileron command.
@@ -23,6 +23,7 @@ _KINDS = {
     79: "left V-tail",
     80: "right V-tail",
 }
+_MIXED = (77, 78, 79, 80)
 _FLAPS = (2, 3)
 _THROTTLES = (70, 73, 74)
 
@@ -41,7 +42,8 @@ def control_commands(
     if not surfaces:
         return LoggedCommands((), absent(outputs.signal.source, 0)), _without_surfaces(parameters)
     commands = np.column_stack([_angle(pulses[:, i], i + 1, parameters) for i in surfaces])
-    names, fractions = unmixed([SIGNS[_KINDS[functions[i]]] for i in surfaces], commands)
+    full = at_full_stick(np.array([_gains(functions[i], parameters) for i in surfaces]))
+    names, fractions = unmixed(full, commands)
     columns = [fractions]
     for name, wanted in (("flap", _FLAPS), ("throttle", _THROTTLES)):
         places = [i for i, function in functions.items() if function in wanted and np.isfinite(pulses[:, i]).any()]
@@ -49,7 +51,23 @@ def control_commands(
             names = (*names, name)
             columns.append(np.mean([_range(pulses[:, i], i + 1, parameters) for i in places], axis=0)[:, np.newaxis])
     signal = Signal(outputs.signal.source, outputs.signal.stamp_ns, np.hstack(columns))
-    return LoggedCommands(names, signal), ()
+    still = ("MIXING_GAIN is 0: elevons and V-tails do not move",) if not full.any(axis=1).all() else ()
+    return LoggedCommands(names, signal), still
+
+
+def _gains(function: int, parameters: Mapping[str, float]) -> tuple[float, float, float]:
+    """A surface's command, as a fraction of its travel, for each unit of roll, pitch and yaw.
+
+    Elevons are (elevator -+ aileron) MIXING_GAIN and V-tails (elevator +- rudder) MIXING_GAIN. A MIXING_OFFSET (%)
+    above zero enlarges the aileron or the rudder before that, one below zero the elevator (ArduPlane ``servos.cpp``,
+    ``channel_function_mixer``; the defaults are those of ``Parameters.cpp``).
+    """
+    roll, pitch, yaw = map(float, SIGNS[_KINDS[function]])
+    if function not in _MIXED:
+        return roll, pitch, yaw
+    gain, offset = parameters.get("MIXING_GAIN", 0.5), parameters.get("MIXING_OFFSET", 0.0) / 100.0
+    of_elevator, of_other = gain * (1.0 + max(-offset, 0.0)), gain * (1.0 + max(offset, 0.0))
+    return roll * of_other, pitch * of_elevator, yaw * of_other
 
 
 def _without_surfaces(parameters: Mapping[str, float]) -> tuple[str, ...]:

@@ -9,12 +9,12 @@ Before 1.14 a mixer file describes the surfaces, which the log does not hold; bu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from sysid_node.flight.logs.autopilot_log import LoggedCommands, Signal, absent
-from sysid_node.flight.logs.readers.mixing import AXES, SIGNS, unmixed
+from sysid_node.flight.logs.readers.mixing import AXES, SIGNS, at_full_stick, unmixed
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stamps
 
@@ -34,8 +34,14 @@ _KINDS = {
 }
 _FLAPS = (9, 10)
 
+#: Flaps, airbrakes, a steered wheel and spoilers, whose torques PX4 takes as zero.
+_WITHOUT_TORQUE = (9, 10, 11, 16, 17, 18)
+
 #: The torque reproduces the servos where four errors of five are below this share of the servos' standard deviation.
 _REPRODUCED = 0.1
+
+#: Gains of the mixer below this are rounding.
+_NO_GAIN = 1e-3
 
 #: The function that PX4 assigns to the first servo (PWM_MAIN_FUNCn = 201).
 _FIRST_SERVO = 201
@@ -59,11 +65,11 @@ def _from_servos(
     topic: Topic, parameters: Parameters, servos: Signal, *, vtol: bool
 ) -> tuple[LoggedCommands, tuple[str, ...]]:
     kinds = [int(parameters.get(f"CA_SV_CS{i}_TYPE", 0)) for i in range(servos.values.shape[1])]
-    signs = [_signs(parameters, i, kind) for i, kind in enumerate(kinds)]
-    used = [i for i, row in enumerate(signs) if any(row)]
-    if not used:
+    full = _full_stick(parameters, kinds)
+    used = np.flatnonzero(full.any(axis=1))
+    if not used.size:
         return LoggedCommands((), absent("actuator_servos", 0)), ("CA_SV_CS*_TYPE name no surface that moves an axis",)
-    names, fractions = unmixed([signs[i] for i in used], servos.values[:, used])
+    names, fractions = unmixed(full[used], servos.values[:, used])
     signal = Signal(servos.source, servos.stamp_ns, fractions)
     signal, remarks = _refined(signal, topic, names, vtol=vtol)
     flaps = [i for i, kind in enumerate(kinds) if kind in _FLAPS]
@@ -76,16 +82,23 @@ def _from_servos(
     return LoggedCommands(names, signal), remarks
 
 
-def _signs(parameters: Parameters, surface: int, kind: int) -> tuple[int, int, int]:
-    """Signs in roll, pitch and yaw: those of the torques CA_SV_CSn_TRQ_*, or of the surface's kind without them."""
-    torques = [parameters.get(f"CA_SV_CS{surface}_TRQ_{axis}", 0.0) for axis in "RPY"]
-    usual = SIGNS.get(_KINDS.get(kind, ""), (0, 0, 0))
-    if not any(torques):
-        return usual
-    roll, pitch, yaw = (int(np.sign(torque)) if abs(torque) > 1e-6 else 0 for torque in torques)
-    if kind in _KINDS:  # an aileron's small torque in yaw does not make it a rudder
-        roll, pitch, yaw = (sign if use else 0 for sign, use in zip((roll, pitch, yaw), usual, strict=True))
-    return roll, pitch, yaw
+def _full_stick(parameters: Parameters, kinds: Sequence[int]) -> Array:
+    """The commands (S, 3) to the surfaces at full stick in roll, pitch and yaw, of the surfaces' ``kinds`` (S,).
+
+    PX4 computes the commands of a fixed wing by the pseudo-inverse of the torques CA_SV_CSn_TRQ_*, which it does not
+    normalise (``ControlAllocationPseudoInverse``, ``ActuatorEffectiveness::getNormalizeRPY``), and limits them to 1.
+    Surfaces of a known kind count for their own axes alone: an aileron's small torque in yaw does not make it a rudder.
+    Where the log states no torques, full stick is the full travel.
+    """
+    usual = np.array([SIGNS.get(_KINDS.get(kind, ""), (0, 0, 0)) for kind in kinds], float)
+    torques = np.array([[parameters.get(f"CA_SV_CS{i}_TRQ_{axis}", 0.0) for axis in "RPY"] for i in range(len(kinds))])
+    stated = torques.any(axis=1) & ~np.isin(kinds, _WITHOUT_TORQUE)
+    gains = np.linalg.pinv(torques[stated].T, rcond=1e-6)
+    gains[np.abs(gains) < _NO_GAIN] = 0.0
+    known = np.array([kind in _KINDS for kind in kinds])[stated, np.newaxis]
+    full = usual.copy()
+    full[stated] = np.where(known & (usual[stated] == 0.0), 0.0, at_full_stick(gains))
+    return full
 
 
 def _refined(servos: Signal, topic: Topic, names: tuple[str, ...], *, vtol: bool) -> tuple[Signal, tuple[str, ...]]:
