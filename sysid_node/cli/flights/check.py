@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.cli.flights.verdicts import refusals_told, refusals_tried, verdicts
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
+from sysid_node.flight.logs.checks.survey import LogSurvey, survey
 from sysid_node.flight.logs.rates import rate_text
-from sysid_node.flight.logs.survey import LogSurvey, survey
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -22,22 +25,26 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     """The command's arguments."""
     parser = commands.add_parser("check", help="say what a flight's file is good for", description=__doc__)
     parser.add_argument("logs", metavar="LOG", type=Path, nargs="+", help=options.LOG_HELP)
+    parser.add_argument("--aircraft", metavar="FILE|NAME", help="say what the commands do with this aircraft file")
     return parser
 
 
 def run(args: argparse.Namespace) -> None:
     """Prints a table for each log. Raises InputError after the last where one could not be read."""
+    aircraft = load_aircraft(args.aircraft) if args.aircraft else None
     unread = []
     for path in args.logs:
         try:
-            _show(survey(path))
+            found = survey(path, aircraft)
+            refused = refusals_told(found) if aircraft is None else refusals_tried(path, aircraft)
+            _show(found, verdicts(found, refused, aircraft_known=aircraft is not None))
         except InputError as error:
             unread.append(str(error))
     if unread:
         raise InputError("; ".join(unread))
 
 
-def _show(found: LogSurvey) -> None:
+def _show(found: LogSurvey, good_for: Mapping[str, str]) -> None:
     console = Console(highlight=False, soft_wrap=True)
     console.print(f"[bold]{found.name}[/bold]: {found.kind}, {found.seconds:.1f} s", markup=True)
     table = Table(box=None, header_style="bold", pad_edge=False)
@@ -49,7 +56,7 @@ def _show(found: LogSurvey) -> None:
         cells = (row.signal, row.source, rate, row.gaps, row.clock, row.verdict)
         table.add_row(*cells, style=style)
     console.print(table)
-    for label, lines in (("excited", found.excitation), ("good for", found.good_for)):
+    for label, lines in (("excited", found.excitation), ("good for", good_for)):
         for name, text in lines.items():
             console.print(f"  {label:9} {name}: {text}", markup=False)
     for label, texts in (("change", found.remedies), ("note", found.remarks)):

@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sysid_node.errors import InputError
-from sysid_node.flight.align import STEP_BACK_NS
 from sysid_node.flight.autopilots.joints import joints_of
 from sysid_node.flight.logs.air_data import air_data, attitude_at
 from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, Signal
+from sysid_node.flight.logs.checks.refusals import Refusal, missing_signals, require
 from sysid_node.flight.logs.flown import seconds, within
 from sysid_node.flight.streams import (
     COMMAND_FRACTIONS,
@@ -22,9 +21,6 @@ from sysid_node.flight.streams import (
     Streams,
     in_order_of_logging,
 )
-
-#: Below this airspeed (m/s) in every sample, nothing was measured: no fixed wing flies so slowly.
-_SLOWEST = 2.0
 
 
 class LogFlight(NamedTuple):
@@ -40,7 +36,7 @@ def flight_of_log(log: AutopilotLog, outputs: str = "") -> LogFlight:
     ``outputs``: which output moves which joint, as in the aircraft file; without it the log's parameters say that, and
     the actuators are fractions of full command. Raises InputError where a signal is missing or nothing was flown.
     """
-    _require_signals(log, outputs)
+    require(log.name, Refusal(missing_signals(log, raw_outputs=bool(outputs))))
     imu = _flown_part(log, log.imu)
     airspeed = _flown_part(log, log.airspeed)
     attitude = attitude_at(log.attitude, imu.stamp_ns)
@@ -58,62 +54,6 @@ def flight_of_log(log: AutopilotLog, outputs: str = "") -> LogFlight:
 
 def _remedy(log: AutopilotLog, role: str) -> str:
     return log.remedies.get(role, "")
-
-
-def _require_signals(log: AutopilotLog, outputs: str) -> None:
-    """Raise InputError where IMU, airspeed or controls are missing, or nothing was flown as a fixed wing."""
-    if not len(log.imu):
-        raise InputError(f"{log.name}: no {log.imu.source} in it; {log.remedies.get(IMU, 'record it too')}")
-    _require_one_clock(log)
-    if log.flown is not None and not log.flown:
-        raise InputError(
-            f"{log.name}: {log.autopilot} never flew as a fixed wing in it (on the ground, or hovering); "
-            "give a log of a flight"
-        )
-    missing = missing_airspeed(log)
-    if missing:
-        raise InputError(f"{log.name}: {missing}")
-    if outputs:
-        if not len(log.outputs.signal):
-            raise InputError(f"{log.name}: no {log.outputs.signal.source} in it; record it too")
-        return
-    if not log.controls.names or not len(log.controls.signal):
-        why = "; ".join(log.remarks) or f"no {log.controls.signal.source} in it"
-        raise InputError(
-            f"{log.name}: which output moves which surface is not known ({why}); write it into the aircraft file, "
-            'e.g. outputs: "elevator=out2:1500:0.001 aileron=out1:1500:0.001"'
-        )
-
-
-def clock_faults(log: AutopilotLog) -> dict[str, str]:
-    """By role, what is wrong with the stamps of IMU, airspeed and controls: a step back of more than a second."""
-    signals = {IMU: log.imu, AIRSPEED: log.airspeed, CONTROLS: log.controls.signal}
-    faults = {}
-    for role, signal in signals.items():
-        steps = np.diff(signal.stamp_ns)
-        if steps.size and int(steps.min()) < -STEP_BACK_NS:
-            place = int(np.argmin(steps))
-            after = (int(signal.stamp_ns[place]) - int(signal.stamp_ns[0])) / 1e9
-            faults[role] = f"the stamps of {signal.source} go back by {-steps[place] / 1e9:.1f} s after {after:.1f} s"
-    return faults
-
-
-def _require_one_clock(log: AutopilotLog) -> None:
-    for fault in clock_faults(log).values():
-        raise InputError(f"{log.name}: {fault} (a clock was set); cut the log there")
-
-
-def missing_airspeed(log: AutopilotLog) -> str:
-    """What is wrong with the airspeed in the part that was flown, or an empty text."""
-    name = log.airspeed.source
-    values = log.airspeed.values[within(log.flown or None, log.airspeed.stamp_ns), 0]
-    if not values.size:
-        return f"no {name} in it; connect an airspeed sensor, and log it"
-    if not np.isfinite(values).any():
-        return f"{name} never comes from a sensor; connect an airspeed sensor"
-    if float(np.nanmax(values)) < _SLOWEST:
-        return f"{name} is {float(np.nanmax(values)):.1f} m/s at most: the airspeed sensor did not work"
-    return ""
 
 
 def _flown_part(log: AutopilotLog, signal: Signal) -> Signal:

@@ -14,11 +14,11 @@ from sysid_node.flight.commands import JointMessage, read_commands
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs.autopilot_log import AutopilotLog
+from sysid_node.flight.logs.checks.refusals import refusal_of_log, refusal_of_streams, require
 from sysid_node.flight.logs.content import Content, content_of
 from sysid_node.flight.logs.damage import reading_log
 from sysid_node.flight.logs.fractions import between_commands, joints_of_fractions
 from sysid_node.flight.logs.log_streams import LogFlight, flight_of_log
-from sysid_node.flight.logs.rates import rates_of_log, rates_of_streams, require_rates
 from sysid_node.flight.logs.readers.autopilot_bag import autopilot_of, read_autopilot_bag
 from sysid_node.flight.logs.readers.dataflash import read_dataflash
 from sysid_node.flight.logs.readers.telemetry import read_telemetry
@@ -74,16 +74,16 @@ def open_streams(
     remapped = topics is not None and dict(topics) != topic_names()
     log = None if remapped else read_autopilot_log(path)
     if log is not None:
-        require_rates(log.name, rates_of_log(log, raw_outputs=bool(aircraft.outputs)))
+        require(log.name, refusal_of_log(log, raw_outputs=bool(aircraft.outputs)))
         streams = flight_of_log(log, aircraft.outputs).streams
     elif not remapped and content_of(path) is Content.TABLE:
         return streams_from_record(read_csv(path), aircraft)
     else:
         streams = read_streams(path, topics, frame)
+    require(streams.name, refusal_of_streams(streams))
     if streams.actuators.content == COMMAND_FRACTIONS:
         streams = replace(streams, actuators=joints_of_fractions(streams.actuators, aircraft, streams.name))
     if streams.actuators.content:
-        require_rates(streams.name, rates_of_streams(streams))
         streams = in_order_of_logging(replace(streams, actuators=between_commands(streams.actuators)))
     return streams
 

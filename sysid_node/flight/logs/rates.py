@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from sysid_node.errors import InputError
 from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, AutopilotLog
 from sysid_node.flight.logs.autopilot_log import IMU as IMU_ROLE
 from sysid_node.flight.logs.flown import within
@@ -91,11 +90,3 @@ def rates_of_streams(streams: Streams) -> dict[str, SampleRate]:
     if joints.content:
         found[ACTUATORS] = _with_steps(found[ACTUATORS], joints.names, joints.positions)
     return found
-
-
-def require_rates(name: str, rates: Mapping[str, SampleRate]) -> None:
-    """Raise InputError, which names every topic that is too slow and the setting that raises its rate."""
-    slow = [found for found in rates.values() if found.rate and found.fault]
-    if slow:
-        remedies = dict.fromkeys(found.remedy for found in slow if found.remedy)
-        raise InputError("; ".join([f"{name}: {slow[0].fault}", *(found.fault for found in slow[1:]), *remedies]))

@@ -1,0 +1,122 @@
+"""Which command takes a flight: told from its survey, or by the commands' own readers where the aircraft is known."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError, InputWarning
+from sysid_node.faults.settings import FaultMonitorSettings
+from sysid_node.flight.actuation import Actuation
+from sysid_node.flight.align import joined_spans, stamp_spans, why_nothing_aligned
+from sysid_node.flight.logs.checks.survey import FULL_DEFLECTION, OUTPUTS, LogSurvey
+from sysid_node.flight.logs.opening import carried_by, load_flight_record
+from sysid_node.flight.pieces import flight_pieces
+from sysid_node.online.alignment.in_pieces import PieceAlignment
+from sysid_node.online.settings import OnlineSettings
+
+#: The shortest flight that ``sysid gap`` diagnoses, s (``gap.flightdata.gap_flight``, which takes long to load).
+SHORTEST_FOR_GAP = 6.0
+
+_KEYS = {
+    OUTPUTS: "outputs (which output moves which joint)",
+    FULL_DEFLECTION: "full_deflection of each control",
+}
+
+_ANGLES = {"alpha": "the angle of attack", "beta": "the sideslip"}
+
+#: Methods of ``sysid identify`` that integrate a model; the others regress on measured flow angles
+#: (``batch.identify``, which takes long to load).
+_WITHOUT_VANES = ("output_error", "filter_error", "*_kalman_filter")
+
+Refusals = Mapping[str, str]  # command -> why it does not take the flight; empty where it does
+
+
+def refusals_told(found: LogSurvey) -> dict[str, str]:
+    """What the commands will refuse, as far as the flight's file alone tells."""
+    always = found.refusal.text
+    whole = always or found.two_clocks
+    short = "" if found.uninterrupted >= SHORTEST_FOR_GAP else _too_short(found.uninterrupted)
+    return {"replay": always, "identify": whole, "gap": whole or short, "faults": always}
+
+
+def _too_short(seconds: float) -> str:
+    return f"{seconds:.1f} s of flight without an interruption; the gap needs {SHORTEST_FOR_GAP:g} s or more"
+
+
+def refusals_tried(path: Path, aircraft: Aircraft) -> dict[str, str]:
+    """What the commands refuse for an aircraft: each one's own reader is asked."""
+    replay = _refusal(path, lambda: _replayed(path, aircraft))
+    return {
+        "replay": replay,
+        "identify": _refusal(path, lambda: load_flight_record(path, aircraft, carried="auto")),
+        "gap": _refusal(path, lambda: _diagnosed(path, aircraft)),
+        "faults": replay,
+    }
+
+
+def _refusal(path: Path, read: Callable[[], object]) -> str:
+    """Why a reader refuses the flight, without the file's name; empty where it does not."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InputWarning)  # the survey has told them
+        try:
+            read()
+        except InputError as error:
+            text = str(error)
+            for name in (f"{path}: ", f"bag {path.name}: ", f"{path.name}: "):
+                text = text.removeprefix(name)
+            return text
+    return ""
+
+
+def _replayed(path: Path, aircraft: Aircraft) -> None:
+    """Read a flight as ``sysid replay`` does, until the first samples. Raises InputError where there are none."""
+    max_gap, setting = OnlineSettings().max_gap, OnlineSettings().actuators
+    with flight_pieces(path, aircraft) as flight:
+        alignment = None
+        spans: dict[str, tuple[float, float]] = {}
+        names: tuple[str, ...] = ()
+        for piece in flight.pieces:
+            names, spans = piece.streams.actuators.names, joined_spans(spans, stamp_spans(piece.streams))
+            alignment = alignment or PieceAlignment(aircraft, max_gap, carried_by(piece.streams, setting))
+            if alignment.take(piece.streams, last=piece.last).time.size:
+                return
+        Actuation.of(aircraft).require(names, flight.name)
+        raise InputError(why_nothing_aligned(flight.name, spans, alignment.rejected if alignment else {}))
+
+
+def _diagnosed(path: Path, aircraft: Aircraft) -> None:
+    from sysid_node.gap.flightdata.gap_flight import load_gap_flight  # noqa: PLC0415  # JAX takes its time
+
+    load_gap_flight(path, aircraft, None, "flu")
+
+
+def verdicts(found: LogSurvey, refused: Refusals, *, aircraft_known: bool) -> dict[str, str]:
+    """By commands, whether they take the flight and how; those with the same verdict are together."""
+    needs = "" if aircraft_known else " and ".join(_KEYS[key] for key in found.needs)
+    where = f", where the aircraft file states {needs}" if needs else ""
+    how = f"yes{where}, {_flow_angles(found.angles)}"
+    taken = {"replay": how, "identify": how, "gap": how, "faults": _faults(found)}
+    if len(found.angles) < 2:
+        taken["identify"] = f"yes{where}, by {', '.join(_WITHOUT_VANES)}; the other methods need both flow angles"
+    texts = {command: f"no: {why}" if why else taken[command] for command, why in refused.items()}
+    together: dict[str, list[str]] = {}
+    for command, text in texts.items():
+        together.setdefault(text, []).append(command)
+    return {", ".join(commands): text for text, commands in together.items()}
+
+
+def _flow_angles(measured: tuple[str, ...]) -> str:
+    missing = [words for name, words in _ANGLES.items() if name not in measured]
+    if len(missing) == len(_ANGLES):
+        return "without vanes: the angle of attack and the sideslip are inferred"
+    return f"with one vane: {missing[0]} is inferred" if missing else "with vanes"
+
+
+def _faults(found: LogSurvey) -> str:
+    learning = FaultMonitorSettings().learning
+    if found.seconds <= learning:
+        return f"no: {found.seconds:.1f} s; more than {learning:g} s are needed to learn what sound flight is like"
+    return "yes" if found.angles else "yes, of surfaces and of the airframe; not of vanes"
