@@ -83,11 +83,14 @@ def px4_log(
     torque: float = 0.0,
     start: datetime.datetime | None = None,
     vehicle: str = "",
+    vanes: Mapping[str, tuple[float, float]] | None = None,
+    aloft: tuple[float, float] | None = None,
 ) -> FlightRecord:
     """A ULog of the flight, of PX4 1.11 where ``old``; without ``drop``, its clock ``jump`` s ahead from midway.
 
     ``torque``: rate of the torque setpoint, Hz, from which PX4 computes the servos linearly. ``start`` is the date that
-    its GPS receiver states, and ``vehicle`` the autopilot's number.
+    its GPS receiver states, and ``vehicle`` the autopilot's number. ``vanes`` are "aoa" and "slip" with the time (s)
+    between which each is out of its range, and ``aloft`` those between which the aircraft flies.
     """
     record = flight()
     us = microseconds(record)
@@ -116,7 +119,13 @@ def px4_log(
         }),
         Topic("vehicle_land_detected", us[:1], {"landed": ("bool", np.array([False]))}),
         *_px4_controls(us[at["controls"]], commands, old=old, elevons=elevons),
+        *(_vane(record, at["airspeed"], name, span) for name, span in (vanes or {}).items()),
     ]  # fmt: skip
+    if aloft is not None:
+        times = us[0] + np.round(np.array([0.0, *aloft]) * 1e6).astype(np.int64)
+        landed = {"landed": ("bool", np.array([True, False, True]))}
+        topics = [topic for topic in topics if topic.name != "vehicle_land_detected"]
+        topics.append(Topic("vehicle_land_detected", times, landed))
     if torque:
         fine = picked(record, torque)
         scaled = fractions(record)[fine][:, :3] * np.array([0.5, 0.8, 1.2])
@@ -130,6 +139,15 @@ def px4_log(
     jumping = (lambda time: time + (round(jump * 1e6) if time > middle else 0)) if jump else None
     write_ulog(path, kept, parameters, release, jumping, vehicle)
     return record
+
+
+def _vane(record: FlightRecord, at: np.ndarray, name: str, span: tuple[float, float]) -> Topic:
+    """A vane's topic: in the time between the two of the span (s from the start) it is at its stop, and not valid."""
+    since = record.time[at] - record.time[0]
+    valid = (since < span[0]) | (since >= span[1])
+    angle = np.where(valid, record[{"aoa": "alpha", "slip": "beta"}[name]][at], 1.0)
+    fields = {f"{name}_rad": ("float", angle), "valid": ("bool", valid)}
+    return Topic(f"airflow_{name}", microseconds(record)[at], fields)
 
 
 def _px4_controls(us: np.ndarray, commands: np.ndarray, *, old: bool, elevons: bool) -> list[Topic]:

@@ -8,7 +8,7 @@ from simulated_logs import FULL_RATES, PX4_DEFAULT, aircraft, px4_log
 
 from sysid_node.errors import InputError
 from sysid_node.flight.align import flight_record
-from sysid_node.flight.logs.opening import load_flight_record, open_log, open_streams
+from sysid_node.flight.logs.opening import load_flight_record, open_log, open_streams, read_autopilot_log
 from sysid_node.flight.streams import COMMANDS
 
 
@@ -33,6 +33,31 @@ def test_the_flight_comes_back(tmp_path, kind):
     np.testing.assert_allclose(back["V"][::2], record["V"][at][::2], atol=1e-4)
     np.testing.assert_allclose(back["rho"], record["rho"][at], atol=1e-4)
     assert not back.measured("alpha")
+
+
+def test_vanes_are_used_where_they_are_valid(tmp_path):
+    """Truth: the record. A vane at its stop says ``valid`` = 0, and holds 1 rad there (PX4's airflow_aoa.msg)."""
+    record = px4_log(tmp_path / "flight.ulg", vanes={"aoa": (5.0, 8.0), "slip": (30.0, 40.0)})
+    back = load_flight_record(tmp_path / "flight.ulg", aircraft())
+    at = np.searchsorted(record.time, record.time[0] + back.time + 1e-4) - 1
+    out = (back.time > 4.99) & (back.time < 8.0)
+    np.testing.assert_array_equal(np.isnan(back["alpha"]), out)
+    for name in ("alpha", "beta"):  # vanes come at every second of the IMU's times
+        known = np.isfinite(back[name])
+        known[1::2] = False
+        np.testing.assert_allclose(back[name][known], record[name][at][known], atol=1e-5)
+        assert known.sum() > 800
+    assert np.isfinite(back["beta"]).all()
+
+
+def test_a_vane_that_was_never_valid_is_none(tmp_path):
+    px4_log(tmp_path / "flight.ulg", vanes={"aoa": (0.0, 99.0)})
+    log = read_autopilot_log(tmp_path / "flight.ulg")
+    assert log.vanes is None
+    px4_log(tmp_path / "other.ulg", vanes={"aoa": (0.0, 99.0), "slip": (99.0, 100.0)})
+    back = load_flight_record(tmp_path / "other.ulg", aircraft())
+    assert not back.measured("alpha")
+    assert back.measured("beta")
 
 
 def test_messages_are_in_the_order_in_which_they_were_logged(tmp_path):

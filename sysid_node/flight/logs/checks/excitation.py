@@ -221,9 +221,8 @@ def _whitened_fit(design: Array, values: Array, known: NDArray[np.bool_], whole:
         coefficients = np.linalg.lstsq(x, y, rcond=_SINGULAR)[0]
     left = y - x @ coefficients
     misfit = float(left @ left) / left.size
-    covariance: Array = (
-        np.linalg.pinv(x.T @ x, rcond=_SINGULAR**2, hermitian=True) * misfit * (left.size / (left.size - x.shape[1]))
-    )
+    inverse = np.linalg.pinv(x.T @ x, rcond=_SINGULAR**2, hermitian=True)
+    covariance = np.asarray(inverse * misfit * left.size / (left.size - x.shape[1]), np.float64)
     return _Fit(misfit, coefficients, covariance)
 
 

@@ -167,8 +167,16 @@ def _vanes(log: _Topics) -> Signal | None:
 
 
 def _vane(log: _Topics, topic: str) -> Signal | None:
+    """The angle (N, 1) of a vane's topic, NaN where the sensor was out of its range (``valid``, airflow_aoa.msg).
+
+    None where it was never valid.
+    """
     angle = next((name for name in log.fields(topic) if name.endswith("_rad")), None)
-    return None if angle is None else log.signal(topic, (angle,))
+    if angle is None:
+        return None
+    signal = log.signal(topic, (angle,))
+    signal.values[np.asarray(log.fields(topic).get("valid", np.ones(len(signal)))) == 0] = np.nan
+    return signal if np.isfinite(signal.values).any() else None
 
 
 def _at_times(signal: Signal, other: Signal) -> Array:
