@@ -223,7 +223,7 @@ def _whitened_fit(design: Array, values: Array, known: NDArray[np.bool_], whole:
     misfit = float(left @ left) / left.size
     inverse = np.linalg.pinv(x.T @ x, rcond=_SINGULAR**2, hermitian=True)
     covariance = np.asarray(inverse * misfit * left.size / (left.size - x.shape[1]), np.float64)
-    return _Fit(misfit, coefficients, covariance)
+    return _Fit(misfit, np.asarray(coefficients, np.float64), covariance)
 
 
 def _laguerre(values: Array, share: float) -> Array:
