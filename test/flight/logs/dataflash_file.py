@@ -1,7 +1,7 @@
 """Writes small DataFlash files, by the format's description (ardupilot.org, binary log format; FMT is message 128)."""
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,8 +32,15 @@ KINDS = {
 }
 
 
-def write_dataflash(path: Path, rows: Mapping[str, Sequence[Sequence[Any]]]) -> None:
-    """A binary DataFlash file with the rows of each kind in the order of their times, after all FMT messages."""
+Rows = Mapping[str, Sequence[Sequence[Any]]]
+Clock = Callable[[int], int]
+
+
+def write_dataflash(path: Path, rows: Rows, clock: Clock = int) -> None:
+    """A binary DataFlash file with the rows of each kind in the order of their times, after all FMT messages.
+
+    ``clock`` gives the stamp of a time.
+    """
     numbers = {name: 128 + i for i, name in enumerate(KINDS)}
     body = bytearray()
     for name, kind in KINDS.items():
@@ -42,8 +49,24 @@ def write_dataflash(path: Path, rows: Mapping[str, Sequence[Sequence[Any]]]) -> 
         body += _row(128, KINDS["FMT"].letters, formats)
     every = [(row[0], name, row) for name, of_kind in rows.items() for row in of_kind]
     for _, name, row in sorted(every, key=lambda one: one[0]):
-        body += _row(numbers[name], KINDS[name].letters, row)
+        body += _row(numbers[name], KINDS[name].letters, (clock(row[0]), *row[1:]))
     path.write_bytes(body)
+
+
+def write_dataflash_text(path: Path, rows: Rows, clock: Clock = int) -> None:
+    """The same as text, as ArduPilot's ground stations and MAVExplorer write it: fields behind ", ", a line each."""
+    numbers = {name: 128 + i for i, name in enumerate(KINDS)}
+    lines = [
+        f"FMT, {numbers[name]}, {struct.calcsize(_layout(kind.letters)) + 3}, {name}, {kind.letters}, "
+        + ",".join(kind.columns)
+        for name, kind in KINDS.items()
+    ]
+    every = [(row[0], name, row) for name, of_kind in rows.items() for row in of_kind]
+    lines += [
+        ", ".join([name, str(clock(row[0])), *map(str, row[1:])])
+        for _, name, row in sorted(every, key=lambda one: one[0])
+    ]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
 def _layout(letters: str) -> str:

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from dataflash_file import write_dataflash
+from dataflash_file import write_dataflash, write_dataflash_text
 from ulog_file import Topic, write_ulog
 
 from sysid_node.aircraft.load import load_aircraft
@@ -85,12 +85,14 @@ def px4_log(
     vehicle: str = "",
     vanes: Mapping[str, tuple[float, float]] | None = None,
     aloft: tuple[float, float] | None = None,
+    pulses: str = "",
 ) -> FlightRecord:
     """A ULog of the flight, of PX4 1.11 where ``old``; without ``drop``, its clock ``jump`` s ahead from midway.
 
     ``torque``: rate of the torque setpoint, Hz, from which PX4 computes the servos linearly. ``start`` is the date that
     its GPS receiver states, and ``vehicle`` the autopilot's number. ``vanes`` are "aoa" and "slip" with the time (s)
     between which each is out of its range, and ``aloft`` those between which the aircraft flies.
+    ``pulses``: the bank, MAIN or AUX, whose pulses are logged in place of the servos' commands.
     """
     record = flight()
     us = microseconds(record)
@@ -121,6 +123,10 @@ def px4_log(
         *_px4_controls(us[at["controls"]], commands, old=old, elevons=elevons),
         *(_vane(record, at["airspeed"], name, span) for name, span in (vanes or {}).items()),
     ]  # fmt: skip
+    parameters = {} if old else _px4_parameters(elevons=elevons)
+    if pulses:
+        topics, stated = _as_pulses(topics, pulses)
+        parameters |= stated
     if aloft is not None:
         times = us[0] + np.round(np.array([0.0, *aloft]) * 1e6).astype(np.int64)
         landed = {"landed": ("bool", np.array([True, False, True]))}
@@ -133,12 +139,35 @@ def px4_log(
     if start is not None:
         utc = {"time_utc_usec": ("uint64_t", np.array([round(start.timestamp() * 1e6)]))}
         topics.append(Topic("sensor_gps", us[:1], utc))
-    parameters = {} if old else _px4_parameters(elevons=elevons)
     kept = [topic for topic in topics if topic.name not in drop]
     release = 0x010B0200 if old else 0x010E0000
     jumping = (lambda time: time + (round(jump * 1e6) if time > middle else 0)) if jump else None
     write_ulog(path, kept, parameters, release, jumping, vehicle)
     return record
+
+
+#: Outputs of servos 1 to 4: their number, shortest and longest pulse (us), and whether they are reversed.
+PWM = ((3, 1000, 2000, False), (1, 1100, 1900, True), (8, 950, 2050, False), (6, 900, 2100, True))
+
+
+def _as_pulses(topics: list[Topic], bank: str) -> tuple[list[Topic], dict[str, float]]:
+    """The topics with actuator_outputs in place of actuator_servos, and the parameters PWM_* of the bank."""
+    (servos,) = (topic for topic in topics if topic.name == "actuator_servos")
+    commands = servos.fields["control[8]"][1]
+    outputs = np.zeros((len(servos.us), 16))
+    parameters: dict[str, float] = {f"PWM_{bank}_REV": sum(1 << number - 1 for number, *_, turned in PWM if turned)}
+    for i, (number, low, high, turned) in enumerate(PWM):
+        signed = -commands[:, i] if turned else commands[:, i]
+        outputs[:, number - 1] = low + 0.5 * (1.0 + signed) * (high - low)
+        parameters[f"PWM_{bank}_FUNC{number}"] = 201 + i
+        parameters |= {f"PWM_{bank}_MIN{number}": low, f"PWM_{bank}_MAX{number}": high}
+    others = [topic for topic in topics if topic.name != "actuator_servos"]
+    fields = {"output[16]": ("float", outputs)}
+    instances = [Topic("actuator_outputs", servos.us, fields, 0)]
+    if bank == "AUX":
+        idle = {"output[16]": ("float", np.full((len(servos.us), 16), 1500.0))}
+        instances = [Topic("actuator_outputs", servos.us, idle, 0), Topic("actuator_outputs", servos.us, fields, 1)]
+    return [*others, *instances], parameters
 
 
 def _vane(record: FlightRecord, at: np.ndarray, name: str, span: tuple[float, float]) -> Topic:
@@ -186,9 +215,15 @@ def dataflash_log(
     board: str = "",
     layout: str = "ailerons",
     mixing: Mapping[str, float] | None = None,
+    text: bool = False,
+    drop: tuple[str, ...] = (),
+    jump: float = 0.0,
+    states: Mapping[str, list[tuple[float, int]]] | None = None,
 ) -> FlightRecord:
     """A DataFlash log of the flight, with a second IMU that is wrong and not the primary.
 
+    ``text`` writes it as text; ``drop`` leaves kinds of messages out, and from midway its clock is ``jump`` s ahead.
+    ``states`` are those of "STAT" (isFlying) and "MODE" (its number) from some times on, s.
     ``layout`` is one of ``LAYOUTS``, and ``mixing`` the parameters MIXING_*, of which a log without them has none.
     ``start`` is the GPS receiver's time at the first message and ``board`` the line with the board's number.
     """
@@ -219,7 +254,12 @@ def dataflash_log(
         "RCOU": [(us[i], *pulses[i].tolist(), 0, 0) for i in at["controls"]],
         "AOA": [(us[i], 3.0, 0.1) for i in at["airspeed"]],
     }  # fmt: skip
-    write_dataflash(path, rows)
+    for kind, changes in (states or {}).items():
+        rows[kind] = [(us[0] + round(since * 1e6), value, 1 if kind == "STAT" else value) for since, value in changes]
+    kept = {kind: of_kind for kind, of_kind in rows.items() if kind not in drop}
+    middle, later = us[len(us) // 2], round(jump * 1e6)
+    write = write_dataflash_text if text else write_dataflash
+    write(path, kept, lambda time: time + (later if time > middle else 0))
     return record
 
 

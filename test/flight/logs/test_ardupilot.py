@@ -45,6 +45,10 @@ def test_the_primary_imu_and_the_estimated_angle_of_attack_are_said(tmp_path):
     ("options", "said"),
     [
         ({"flying": 0}, "never flew as a fixed wing"),
+        ({"states": {"MODE": [(0.0, 18)]}}, "never flew as a fixed wing"),
+        ({"drop": ("ARSP",)}, "no ARSP in it; connect an airspeed sensor, and log it"),
+        ({"drop": ("IMU",)}, "no IMU in it; LOG_BITMASK: set bit 7"),
+        ({"drop": ("PARM",)}, "which output moves which surface is not known .the log holds no parameters SERVOn"),
         (
             {"rates": {**FULL_RATES, "controls": 10.0}},
             r"RCOU comes at 10 Hz; 20 Hz are needed; LOG_BITMASK: set bit 13",
@@ -55,6 +59,62 @@ def test_what_a_log_lacks_is_one_line(tmp_path, options, said):
     dataflash_log(tmp_path / "flight.bin", **options)
     with pytest.raises(InputError, match=said):
         load_flight_record(tmp_path / "flight.bin", aircraft())
+
+
+def test_all_that_a_log_lacks_is_said_at_once(tmp_path):
+    rates = {**FULL_RATES, "imu": 10.0}
+    dataflash_log(tmp_path / "flight.bin", rates, drop=("ARSP", "PARM"))
+    with pytest.raises(InputError) as caught:
+        load_flight_record(tmp_path / "flight.bin", aircraft())
+    for words in ("no ARSP in it", "IMU[1] comes at 10 Hz; 20 Hz are needed", "which output moves which surface"):
+        assert words in str(caught.value)
+
+
+def test_a_text_log_is_the_binary_one(tmp_path):
+    """Truth: the binary log of the same messages, whose floats have 24 bits."""
+    dataflash_log(tmp_path / "flight.bin")
+    dataflash_log(tmp_path / "flight.log", text=True)
+    binary, text = (load_flight_record(tmp_path / f"flight.{kind}", aircraft()) for kind in ("bin", "log"))
+    np.testing.assert_array_equal(text.time, binary.time)
+    for name in ("ax", "q", "theta", "V", "rho", "de", "da", "dr", "thrust"):
+        np.testing.assert_allclose(text[name], binary[name], atol=2e-5, err_msg=name)
+
+
+def test_a_text_log_that_was_cut_short_is_used_as_far_as_it_goes(tmp_path):
+    record = dataflash_log(tmp_path / "flight.log", text=True)
+    whole = (tmp_path / "flight.log").read_bytes()
+    (tmp_path / "short.log").write_bytes(whole[: len(whole) // 2 + 5])
+    back = load_flight_record(tmp_path / "short.log", aircraft())
+    assert back.duration == pytest.approx(record.duration / 2, rel=0.1)
+
+
+@pytest.mark.parametrize("text", [False, True])
+def test_a_clock_that_was_set_back_is_refused(tmp_path, text):
+    dataflash_log(tmp_path / "flight", text=text, jump=-30.0)
+    with pytest.raises(InputError, match=r"the stamps of IMU\[1\] go back by 30.0 s after 10.0 s .a clock was set"):
+        load_flight_record(tmp_path / "flight", aircraft())
+
+
+def test_a_clock_that_jumps_ahead_leaves_a_gap(tmp_path):
+    record = dataflash_log(tmp_path / "flight.bin", jump=40.0)
+    back = load_flight_record(tmp_path / "flight.bin", aircraft())
+    assert back.duration == pytest.approx(record.duration + 40.0, abs=0.1)
+    assert np.diff(back.time).max() > 39.0
+
+
+def test_the_part_that_was_flown_as_a_fixed_wing_is_taken(tmp_path):
+    """Truth: in the air from 2 s to 17 s, of which QHOVER (18) and QLAND (20) take all but 5 s to 12 s (FBWA is 5)."""
+    states = {
+        "STAT": [(0.0, 0), (2.0, 1), (17.0, 0)],
+        "MODE": [(0.0, 18), (5.0, 5), (12.0, 20)],
+    }
+    record = dataflash_log(tmp_path / "flight.bin", states=states)
+    back = load_flight_record(tmp_path / "flight.bin", aircraft())
+    assert back.duration == pytest.approx(7.0, abs=0.05)
+    first = np.searchsorted(record.time, record.time[0] + 5.0)
+    assert np.abs(record["q"][first : first + 4] - back["q"][0]).min() < 1e-5
+    (said,) = (remark for remark in open_log(tmp_path / "flight.bin").remarks if "flown as a fixed wing" in remark)
+    assert said == "flown as a fixed wing: 7.0 of 20.0 s (5.0 to 12.0 s); the rest is left out"
 
 
 def test_truncated_and_damaged_logs(tmp_path):

@@ -35,6 +35,32 @@ def test_the_flight_comes_back(tmp_path, kind):
     assert not back.measured("alpha")
 
 
+def test_the_part_that_was_flown_is_taken(tmp_path):
+    """Truth: landed until 4 s and from 15 s on (vehicle_land_detected)."""
+    record = px4_log(tmp_path / "flight.ulg", aloft=(4.0, 15.0))
+    back = load_flight_record(tmp_path / "flight.ulg", aircraft())
+    assert back.duration == pytest.approx(11.0, abs=0.05)
+    first = np.searchsorted(record.time, record.time[0] + 4.0)
+    assert np.abs(record["q"][first : first + 4] - back["q"][0]).min() < 1e-5
+    (said,) = (remark for remark in open_log(tmp_path / "flight.ulg").remarks if "flown as a fixed wing" in remark)
+    assert said == "flown as a fixed wing: 11.0 of 20.0 s (4.0 to 15.0 s); the rest is left out"
+
+
+@pytest.mark.parametrize("bank", ["MAIN", "AUX"])
+def test_servos_are_read_from_their_pulses(tmp_path, bank):
+    """Truth: the record. Only the outputs' pulses are logged, of servos 1 to 4 at outputs of other numbers.
+
+    PX4 maps -1..1 to PWM_*_MIN..MAX, the other way round where the output's bit of PWM_*_REV is set.
+    """
+    record = px4_log(tmp_path / "flight.ulg", pulses=bank)
+    streams = open_streams(tmp_path / "flight.ulg", aircraft())
+    assert streams.actuators.source == "actuator_outputs"
+    back = flight_record(aircraft(), streams, 0.2)
+    at = np.searchsorted(record.time, record.time[0] + back.time + 1e-4) - 1
+    for name in ("de", "da", "dr"):
+        np.testing.assert_allclose(back[name], record[name][at], atol=1e-4, err_msg=name)
+
+
 def test_vanes_are_used_where_they_are_valid(tmp_path):
     """Truth: the record. A vane at its stop says ``valid`` = 0, and holds 1 rad there (PX4's airflow_aoa.msg)."""
     record = px4_log(tmp_path / "flight.ulg", vanes={"aoa": (5.0, 8.0), "slip": (30.0, 40.0)})

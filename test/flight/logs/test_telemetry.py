@@ -69,6 +69,29 @@ def test_what_a_log_lacks_is_one_line(tmp_path, options, said):
         load_flight_record(tmp_path / "flight.tlog", aircraft())
 
 
+def test_a_log_that_was_cut_short_is_used_as_far_as_it_goes(tmp_path):
+    """A ground station that was switched off: the file ends in the midst of a message, or within the first."""
+    telemetry_log(tmp_path / "flight.tlog")
+    whole = (tmp_path / "flight.tlog").read_bytes()
+    (tmp_path / "short.tlog").write_bytes(whole[: len(whole) // 2 + 3])
+    complete, short = (load_flight_record(tmp_path / f"{name}.tlog", aircraft()) for name in ("flight", "short"))
+    assert short.duration == pytest.approx(complete.duration / 2, rel=0.1)
+    (tmp_path / "head.tlog").write_bytes(whole[:30])
+    with pytest.raises(InputError, match=r"head\.tlog: no HIGHRES_IMU in it"):
+        load_flight_record(tmp_path / "head.tlog", aircraft())
+
+
+def test_a_damaged_part_is_left_out(tmp_path):
+    telemetry_log(tmp_path / "flight.tlog")
+    damaged = bytearray((tmp_path / "flight.tlog").read_bytes())
+    middle = len(damaged) // 2
+    damaged[middle : middle + 400] = bytes(400)
+    (tmp_path / "damaged.tlog").write_bytes(damaged)
+    complete, left = (load_flight_record(tmp_path / f"{name}.tlog", aircraft()) for name in ("flight", "damaged"))
+    assert left.duration == pytest.approx(complete.duration, rel=0.02)
+    assert 0.95 * len(complete) < len(left) < len(complete)
+
+
 def test_the_temperature_that_was_assumed_is_said(tmp_path):
     telemetry_log(tmp_path / "flight.tlog")
     assert any("at 15 degC" in remark for remark in open_log(tmp_path / "flight.tlog").remarks)
