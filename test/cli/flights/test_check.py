@@ -11,10 +11,11 @@ from simulated_logs import FULL_RATES, PX4_DEFAULT, aircraft, dataflash_log, fli
 
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.batch.identify import METHODS
-from sysid_node.cli.flights.verdicts import SHORTEST_FOR_GAP
+from sysid_node.cli.flights.verdicts import SHORTEST_FOR_GAP, verdicts
 from sysid_node.cli.main import main
 from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.csv import write_csv
+from sysid_node.flight.logs.checks.survey import survey
 from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.flight.record import FlightRecord
 
@@ -189,6 +190,26 @@ def test_an_aircraft_file_makes_rates_non_dimensional(tmp_path, capsys):
     for symbol, length in (("p", "b"), ("q", "cbar"), ("r", "b")):
         half = getattr(size, length) / (2.0 * np.mean(record["V"]))
         assert f"({symbol} {length}/2V {np.std(record[symbol]) * half:.2g})" in out
+
+
+def test_faults_are_looked_for_in_flights_that_are_long_enough(tmp_path, capsys):
+    """Truth: what a replay of the short flight says of its faults."""
+    path = table(tmp_path)
+    assert main(["check", str(path), str(BAG)]) == 0
+    short, long = capsys.readouterr().out.split("rosbag2 recording")
+    assert "faults: no: 8.0 s; more than 20 s are needed to learn what sound flight is like" in short
+    assert "faults: yes\n" in long
+    assert main(["replay", str(path), "--aircraft", "cdrw", "--out", str(tmp_path / "out")]) == 0
+    assert "no faults were looked for: the flight is too short" in capsys.readouterr().out
+
+
+def test_without_vanes_their_faults_are_not_looked_for():
+    found = survey(BAG)
+    none = dict.fromkeys(("replay", "identify", "gap", "faults"), "")
+    told = verdicts(replace(found, angles=()), none, aircraft_known=True)
+    assert told["faults"] == "yes, of surfaces and of the airframe; not of vanes"
+    assert told["replay, gap"] == "yes, without vanes: the angle of attack and the sideslip are inferred"
+    assert told["identify"].startswith("yes, by output_error, filter_error, *_kalman_filter")
 
 
 def test_the_shortest_flight_is_that_of_the_gap():

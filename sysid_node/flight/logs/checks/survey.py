@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -100,6 +100,7 @@ class _Signals:
     rates: Mapping[str, SampleRate]
     faults: Mapping[str, str]
     refusal: Refusal
+    back: Mapping[str, float] = field(default_factory=dict)  # s by which a topic's clock was set back, by topic
     two_clocks: str = ""
     needs: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -126,10 +127,13 @@ def survey(path: str | Path, aircraft: Aircraft | None = None) -> LogSurvey:
 
 
 def _of_log(log: AutopilotLog, aircraft: Aircraft | None) -> _Signals:
-    def flown(signal: Signal) -> Signal:
-        return signal.selected(within(log.flown or None, signal.stamp_ns))
-
     raw = bool(aircraft.outputs) if aircraft is not None else False
+    set_back = clock_faults(log, raw_outputs=raw)
+    spans = None if set_back else log.flown or None  # no time of a clock that was set tells when it flew
+
+    def flown(signal: Signal) -> Signal:
+        return signal.selected(within(spans, signal.stamp_ns))
+
     refusal, needs = refusal_of_log(log, raw_outputs=raw), [FULL_DEFLECTION]
     if aircraft is None and refusal.reasons:
         with_outputs = refusal_of_log(log, raw_outputs=True)
@@ -137,7 +141,8 @@ def _of_log(log: AutopilotLog, aircraft: Aircraft | None) -> _Signals:
     grounded = log.flown is not None and not log.flown
     faults = {IMU: "never flew as a fixed wing"} if grounded else {AIR_DATA: missing_airspeed(log)}
     roles = {IMU_ROLE: IMU, AIRSPEED: AIR_DATA, CONTROLS: ACTUATORS}
-    faults |= {roles[role]: fault for role, fault in clock_faults(log, raw_outputs=raw).items()}
+    faults |= {roles[role]: fault for role, fault in set_back.items()}
+    whole = {IMU: log.imu, AIR_DATA: log.airspeed, ACTUATORS: (log.outputs if raw else log.controls).signal}
     others = {"attitude": flown(log.attitude), "air density": flown(log.density)}
     if log.vanes is not None:
         others["vanes"] = flown(log.vanes)
@@ -146,9 +151,10 @@ def _of_log(log: AutopilotLog, aircraft: Aircraft | None) -> _Signals:
         flown(log.airspeed),
         inputs_of_log(log, aircraft),
         others,
-        rates_of_log(log, raw_outputs=raw),
+        rates_of_log(replace(log, flown=spans), raw_outputs=raw),
         faults,
         refusal,
+        back={topic: step_back(signal.stamp_ns) for topic, signal in whole.items()},
         needs=tuple(needs),
         remarks=(*part_remarks(log), *(remark for remark in log.remarks if len(log.imu))),
         remedies=log.remedies,
@@ -167,7 +173,7 @@ def _of_streams(streams: Streams, aircraft: Aircraft | None) -> _Signals:
     others["attitude"] = Signal(rates[IMU].source, imu.arrival.stamp_ns, imu.attitude)
     others["air density"] = Signal(rates[AIR_DATA].source, air.arrival.stamp_ns, air.values[:, 3:])
     back = {topic: step_back(stream.arrival.stamp_ns) for topic, stream in streams.by_topic.items()}
-    back = {topic: seconds for topic, seconds in back.items() if seconds > STEP_BACK_NS / 1e9}
+    set_back = {topic: seconds for topic, seconds in back.items() if seconds > STEP_BACK_NS / 1e9}
     return _Signals(
         Signal(rates[IMU].source, imu.arrival.stamp_ns, imu.values),
         Signal(rates[AIR_DATA].source, air.arrival.stamp_ns, air.values[:, :1]),
@@ -176,7 +182,8 @@ def _of_streams(streams: Streams, aircraft: Aircraft | None) -> _Signals:
         rates,
         {},
         refusal,
-        next((f"the stamps of {t} go back by {s:.1f} s; cut the recording there" for t, s in back.items()), ""),
+        back,
+        next((f"the stamps of {t} go back by {s:.1f} s; cut the recording there" for t, s in set_back.items()), ""),
         (FULL_DEFLECTION,) if joints.content == COMMAND_FRACTIONS else (),
         tuple(f"{fault} of an autopilot's log" for fault in slow if not joints.content),
     )
@@ -185,12 +192,15 @@ def _of_streams(streams: Streams, aircraft: Aircraft | None) -> _Signals:
 def _surveyed(name: str, kind: str, signals: _Signals, aircraft: Aircraft | None) -> LogSurvey:
     rows, to_change = [], []
     for topic, (shown, role, signal) in signals.needed.items():
-        rows.append(_row(shown, signal, signals.rates[topic], signals.faults.get(topic, "")))
+        clock = _clock(signal, signals.back[topic])
+        rows.append(_row(shown, signal, signals.rates[topic], clock, signals.faults.get(topic, "")))
         if role in signals.remedies and (not len(signal) or signals.rates[topic].fault):
             to_change.append(signals.remedies[role])
     for shown, signal in signals.others.items():
         missing = "" if np.isfinite(signal.values).any() else "none"
-        rows.append(_row(shown, signal, SampleRate(signal.source, rate_of(signal.stamp_ns), 0.0, ""), missing))
+        rows.append(
+            _row(shown, signal, SampleRate(signal.source, rate_of(signal.stamp_ns), 0.0, ""), _clock(signal), missing)
+        )
     stamps = signals.imu.stamp_ns
     vanes = signals.others.get("vanes")
     return LogSurvey(
@@ -213,12 +223,10 @@ def _measured(signal: Signal, column: int) -> bool:
     return bool(np.isfinite(signal.values[:, column]).any())
 
 
-def _row(shown: str, signal: Signal, found: SampleRate, fault: str) -> SurveyRow:
+def _row(shown: str, signal: Signal, found: SampleRate, clock: str, fault: str) -> SurveyRow:
     if not len(signal):
         fault = fault or f"no {signal.source} in it"
-    return SurveyRow(
-        shown, signal.source, found.rate, found.needed, _gaps(signal), _clock(signal), fault or found.fault
-    )
+    return SurveyRow(shown, signal.source, found.rate, found.needed, _gaps(signal), clock, fault or found.fault)
 
 
 def _gaps(signal: Signal) -> str:
@@ -228,8 +236,9 @@ def _gaps(signal: Signal) -> str:
     return f"{long.size}, longest {long.max():.2f} s" if long.size else "none"
 
 
-def _clock(signal: Signal) -> str:
-    back = step_back(signal.stamp_ns)
+def _clock(signal: Signal, back: float = 0.0) -> str:
+    """Faults of a signal's clock, which was set back by ``back`` s before the part that is used was chosen."""
+    back = max(back, step_back(signal.stamp_ns))
     if back > STEP_BACK_NS / 1e9:
         return f"goes back by {back:.1f} s"
     odd = int(np.count_nonzero(np.diff(signal.stamp_ns) <= 0))
