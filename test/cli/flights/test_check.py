@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mavros_bag import OUTPUTS, mavros_bag
-from simulated_logs import FULL_RATES, PX4_DEFAULT, aircraft, dataflash_log, flight, picked, px4_log
+from simulated_logs import BAG, FULL_RATES, PX4_DEFAULT, aircraft, dataflash_log, flight, picked, px4_log
 
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.batch.identify import METHODS
