@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError, InputWarning
@@ -39,7 +42,9 @@ def refusals_told(found: LogSurvey) -> dict[str, str]:
     always = found.refusal.text
     whole = always or found.two_clocks
     short = "" if found.uninterrupted >= SHORTEST_FOR_GAP else _too_short(found.uninterrupted)
-    return {"replay": always, "identify": whole, "gap": whole or short, "faults": always}
+    gap = whole or ("" if found.longitudinal else found.incomplete) or short
+    replay = always or found.incomplete
+    return {"replay": replay, "identify": whole or found.incomplete, "gap": gap, "faults": replay}
 
 
 def _too_short(seconds: float) -> str:
@@ -51,7 +56,7 @@ def refusals_tried(path: Path, aircraft: Aircraft) -> dict[str, str]:
     replay = _refusal(path, lambda: _replayed(path, aircraft))
     return {
         "replay": replay,
-        "identify": _refusal(path, lambda: load_flight_record(path, aircraft, carried="auto")),
+        "identify": _refusal(path, lambda: _identified(path, aircraft)),
         "gap": _refusal(path, lambda: _diagnosed(path, aircraft)),
         "faults": replay,
     }
@@ -65,6 +70,7 @@ def _refusal(path: Path, read: Callable[[], object]) -> str:
             read()
         except InputError as error:
             text = str(error)
+            text = text.partition(": ")[2] if text.startswith("flight '") else text
             for name in (f"{path}: ", f"bag {path.name}: ", f"{path.name}: "):
                 text = text.removeprefix(name)
             return text
@@ -85,6 +91,15 @@ def _replayed(path: Path, aircraft: Aircraft) -> None:
                 return
         Actuation.of(aircraft).require(names, flight.name)
         raise InputError(why_nothing_aligned(flight.name, spans, alignment.rejected if alignment else {}))
+
+
+def _identified(path: Path, aircraft: Aircraft) -> None:
+    """Read a flight as ``sysid identify`` does. Flow angles need not be measured, as not all methods need them."""
+    from sysid_node.batch.regression.measured_coefficients import measured_coefficients  # noqa: PLC0415  # JAX
+
+    record = load_flight_record(path, aircraft, carried="auto")
+    unmeasured = {name: np.zeros(len(record)) for name in _ANGLES if not record.measured(name)}
+    measured_coefficients(aircraft, replace(record, columns={**record.columns, **unmeasured}))
 
 
 def _diagnosed(path: Path, aircraft: Aircraft) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
@@ -25,17 +26,35 @@ def streams_from_record(flight: FlightRecord, aircraft: Aircraft | None = None) 
     The joints are those of the aircraft, by the inverse of its map, where one is given; otherwise ``elevator``,
     ``aileron`` and ``rudder``, with thrust in N as ``throttle``. Raises InputError where a needed column is missing.
     """
+    missing = missing_columns(flight, standard=aircraft is None)
+    if missing:
+        raise InputError(f"flight {flight.name!r}: {missing}")
+    return _streams(flight, _standard_joints(flight) if aircraft is None else _aircraft_joints(flight, aircraft))
+
+
+def missing_columns(flight: FlightRecord, *, standard: bool = True) -> str:
+    """The columns without values that a bag cannot do without, or "". ``standard`` joints are not an aircraft's."""
     missing = [column for column in _NEEDED if not flight.measured(column)]
     if missing:
-        raise InputError(f"flight {flight.name!r}: no values in {', '.join(missing)}; a bag needs them")
+        return f"no values in {', '.join(missing)}; a bag needs them"
+    joints = _standard_joints(flight)
+    return "no values in de, da, dr or thrust; a bag needs one of them" if standard and not joints else ""
+
+
+def incomplete_streams(flight: FlightRecord) -> Streams:
+    """As ``streams_from_record``, with NaN where nothing was measured, and without joints where no control was."""
+    return _streams(flight, _standard_joints(flight))
+
+
+def _streams(flight: FlightRecord, joints: Mapping[str, Array]) -> Streams:
     since = np.round(flight.time * 1e9).astype(np.int64)
     stamps = since + (flight.start_ns or _START_NS - min(int(since[0]), 0))
     imu, air_data, actuators = arrivals_in_stamp_order(stamps, stamps, stamps)
-    joints = _standard_joints(flight) if aircraft is None else _aircraft_joints(flight, aircraft)
+    positions = np.column_stack(list(joints.values())) if joints else np.empty((len(flight), 0))
     return Streams(
         ImuStream(imu, _side_by_side(flight, *_NEEDED[:6]), _side_by_side(flight, "phi", "theta", "psi"), "imu"),
         AirDataStream(air_data, _side_by_side(flight, "V", "alpha", "beta", "rho")),
-        JointStream(actuators, tuple(joints), np.column_stack(list(joints.values()))),
+        JointStream(actuators, tuple(joints), positions),
         flight.name,
     )
 
@@ -49,8 +68,6 @@ def _standard_joints(flight: FlightRecord) -> dict[str, Array]:
     joints = {joint: flight[symbol] for joint, symbol in STANDARD_JOINTS.items() if flight.measured(symbol)}
     if flight.measured("thrust"):
         joints[THROTTLE_JOINT] = flight["thrust"]
-    if not joints:
-        raise InputError(f"flight {flight.name!r}: no values in de, da, dr or thrust; a bag needs one of them")
     return joints
 
 

@@ -30,7 +30,7 @@ from sysid_node.flight.logs.flown import within
 from sysid_node.flight.logs.log_streams import part_remarks
 from sysid_node.flight.logs.opening import is_table, read_autopilot_log
 from sysid_node.flight.logs.rates import SampleRate, rate_of, rates_of_log, rates_of_streams
-from sysid_node.flight.logs.record_streams import streams_from_record
+from sysid_node.flight.logs.record_streams import incomplete_streams, missing_columns
 from sysid_node.flight.streams import COMMAND_FRACTIONS, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
@@ -71,8 +71,9 @@ class SurveyRow:
 class LogSurvey:
     """What was found in a flight's file.
 
-    ``refusal`` is why no command takes it, and ``two_clocks`` why those do not that align it as a whole. ``needs`` are
-    the keys that the aircraft file must state.
+    ``refusal`` is why no command takes it, and ``two_clocks`` why those do not that align it as a whole. ``incomplete``
+    are columns that a table lacks, of which the gap needs those of the ``longitudinal`` motion alone. ``needs`` are the
+    keys that the aircraft file must state.
     """
 
     name: str
@@ -84,6 +85,8 @@ class LogSurvey:
     angles: tuple[str, ...]  # of "alpha" and "beta", those that were measured
     refusal: Refusal
     two_clocks: str
+    incomplete: str
+    longitudinal: bool
     needs: tuple[str, ...]
     remarks: tuple[str, ...]
     remedies: tuple[str, ...]  # settings of the autopilot to change
@@ -102,6 +105,8 @@ class _Signals:
     refusal: Refusal
     back: Mapping[str, float] = field(default_factory=dict)  # s by which a topic's clock was set back, by topic
     two_clocks: str = ""
+    incomplete: str = ""
+    longitudinal: bool = True
     needs: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     remedies: Mapping[str, str] = field(default_factory=dict)  # by role
@@ -122,8 +127,14 @@ def survey(path: str | Path, aircraft: Aircraft | None = None) -> LogSurvey:
     log = read_autopilot_log(path)
     if log is not None:
         return _surveyed(path.name, log.autopilot, _of_log(log, aircraft), aircraft)
-    streams = streams_from_record(read_csv(path), aircraft) if is_table(path) else read_streams(path)
-    return _surveyed(path.name, content_of(path).value, _of_streams(streams, aircraft), aircraft)
+    if is_table(path):
+        record = read_csv(path)
+        found = _of_streams(incomplete_streams(record), None)  # whose joints are the controls
+        longitudinal = all(map(record.measured, ("ax", "az", "q", "V", "alpha", "rho", "de")))
+        found = replace(found, incomplete=missing_columns(record), longitudinal=longitudinal)
+    else:
+        found = _of_streams(read_streams(path), aircraft)
+    return _surveyed(path.name, content_of(path).value, found, aircraft)
 
 
 def _of_log(log: AutopilotLog, aircraft: Aircraft | None) -> _Signals:
@@ -183,9 +194,11 @@ def _of_streams(streams: Streams, aircraft: Aircraft | None) -> _Signals:
         {},
         refusal,
         back,
-        next((f"the stamps of {t} go back by {s:.1f} s; cut the recording there" for t, s in set_back.items()), ""),
-        (FULL_DEFLECTION,) if joints.content == COMMAND_FRACTIONS else (),
-        tuple(f"{fault} of an autopilot's log" for fault in slow if not joints.content),
+        two_clocks=next(
+            (f"the stamps of {t} go back by {s:.1f} s; cut the recording there" for t, s in set_back.items()), ""
+        ),
+        needs=(FULL_DEFLECTION,) if joints.content == COMMAND_FRACTIONS else (),
+        remarks=tuple(f"{fault} of an autopilot's log" for fault in slow if not joints.content),
     )
 
 
@@ -213,6 +226,8 @@ def _surveyed(name: str, kind: str, signals: _Signals, aircraft: Aircraft | None
         tuple(name for i, name in enumerate(("alpha", "beta")) if vanes is not None and _measured(vanes, i)),
         signals.refusal,
         signals.two_clocks,
+        signals.incomplete,
+        signals.longitudinal,
         signals.needs,
         signals.remarks,
         tuple(dict.fromkeys(to_change)),
