@@ -74,6 +74,8 @@ def _refusal(path: Path, read: Callable[[], object]) -> str:
             for name in (f"{path}: ", f"bag {path.name}: ", f"{path.name}: "):
                 text = text.removeprefix(name)
             return text
+        except ModuleNotFoundError as error:  # as the command itself, which needs more packages than this one
+            return f"needs the package {error.name}, which is not installed; run: pip install -r requirements/desk.txt"
     return ""
 
 

@@ -1,5 +1,6 @@
 """``sysid check``: one table a log, what to change, and exactly what the other commands do with it."""
 
+import sys
 from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
@@ -201,6 +202,16 @@ def test_an_aircraft_file_makes_rates_non_dimensional(tmp_path, capsys):
     for symbol, length in (("p", "b"), ("q", "cbar"), ("r", "b")):
         half = getattr(size, length) / (2.0 * np.mean(record["V"]))
         assert f"({symbol} {length}/2V {np.std(record[symbol]) * half:.2g})" in out
+
+
+def test_a_package_that_is_missing_refuses_its_commands_alone(tmp_path, capsys, monkeypatch):
+    """On a companion computer JAX is not installed; ``replay`` does not need it."""
+    monkeypatch.setitem(sys.modules, "sysid_node.gap.flightdata.gap_flight", None)
+    monkeypatch.setitem(sys.modules, "sysid_node.batch.regression.measured_coefficients", None)
+    assert main(["check", str(table(tmp_path)), "--aircraft", "cdrw"]) == 0
+    out = capsys.readouterr().out
+    assert taken_by(out) == {"replay"}
+    assert out.count("which is not installed; run: pip install -r requirements/desk.txt") == 2
 
 
 def test_faults_are_looked_for_in_flights_that_are_long_enough(tmp_path, capsys):
