@@ -42,7 +42,8 @@ def refusals_told(found: LogSurvey) -> dict[str, str]:
     always = found.refusal.text
     whole = always or found.two_clocks
     short = "" if found.uninterrupted >= SHORTEST_FOR_GAP else _too_short(found.uninterrupted)
-    gap = whole or ("" if found.longitudinal else found.incomplete) or short
+    lacks = f"no complete {', '.join(found.gap_lacks)}; the gap cannot be measured without" if found.gap_lacks else ""
+    gap = whole or lacks or short
     replay = always or found.incomplete
     return {"replay": replay, "identify": whole or found.incomplete, "gap": gap, "faults": replay}
 

@@ -104,6 +104,7 @@ FLIGHTS = {
     "a short table": (lambda folder: table(folder, seconds=3.0), True, ("replay", "identify")),
     "a longitudinal table": (lambda folder: lacking(folder, "ay", "p", "r", "beta", "da", "dr"), True, ("gap",)),
     "a table without rudder": (lambda folder: lacking(folder, "dr"), True, ()),
+    "a table without density": (lambda folder: lacking(folder, "rho"), True, ("replay", "identify")),
     "a table without airspeed": (lambda folder: lacking(folder, "V"), True, ()),
     "a bag": (bag, True, ("replay", "identify", "gap")),
     "a bag with two clocks": (lambda folder: bag(folder, back=True), True, ("replay",)),

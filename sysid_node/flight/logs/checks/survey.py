@@ -31,6 +31,7 @@ from sysid_node.flight.logs.log_streams import part_remarks
 from sysid_node.flight.logs.opening import is_table, read_autopilot_log
 from sysid_node.flight.logs.rates import SampleRate, rate_of, rates_of_log, rates_of_streams
 from sysid_node.flight.logs.record_streams import incomplete_streams, missing_columns
+from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.streams import COMMAND_FRACTIONS, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
@@ -72,8 +73,8 @@ class LogSurvey:
     """What was found in a flight's file.
 
     ``refusal`` is why no command takes it, and ``two_clocks`` why those do not that align it as a whole. ``incomplete``
-    are columns that a table lacks, of which the gap needs those of the ``longitudinal`` motion alone. ``needs`` are the
-    keys that the aircraft file must state.
+    are columns that a table lacks, of which the gap needs those of the longitudinal motion alone, but all their
+    samples: ``gap_lacks``. ``needs`` are the keys that the aircraft file must state.
     """
 
     name: str
@@ -86,7 +87,7 @@ class LogSurvey:
     refusal: Refusal
     two_clocks: str
     incomplete: str
-    longitudinal: bool
+    gap_lacks: tuple[str, ...]
     needs: tuple[str, ...]
     remarks: tuple[str, ...]
     remedies: tuple[str, ...]  # settings of the autopilot to change
@@ -106,7 +107,7 @@ class _Signals:
     back: Mapping[str, float] = field(default_factory=dict)  # s by which a topic's clock was set back, by topic
     two_clocks: str = ""
     incomplete: str = ""
-    longitudinal: bool = True
+    gap_lacks: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     remedies: Mapping[str, str] = field(default_factory=dict)  # by role
@@ -130,11 +131,17 @@ def survey(path: str | Path, aircraft: Aircraft | None = None) -> LogSurvey:
     if is_table(path):
         record = read_csv(path)
         found = _of_streams(incomplete_streams(record), None)  # whose joints are the controls
-        longitudinal = all(map(record.measured, ("ax", "az", "q", "V", "alpha", "rho", "de")))
-        found = replace(found, incomplete=missing_columns(record), longitudinal=longitudinal)
+        found = replace(found, incomplete=missing_columns(record), gap_lacks=_not_whole(record))
     else:
         found = _of_streams(read_streams(path), aircraft)
     return _surveyed(path.name, content_of(path).value, found, aircraft)
+
+
+def _not_whole(record: FlightRecord) -> tuple[str, ...]:
+    """What ``sysid gap`` lacks in a table; from the lateral motion, too, the angle of attack can be inferred."""
+    whole = {name for name in ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "rho") if np.isfinite(record[name]).all()}
+    inferred = {"alpha"} if {"ay", "p", "r"} <= whole and not record.measured("alpha") else set()
+    return tuple(name for name in ("ax", "az", "q", "V", "alpha", "rho") if name not in whole | inferred)
 
 
 def _of_log(log: AutopilotLog, aircraft: Aircraft | None) -> _Signals:
@@ -227,7 +234,7 @@ def _surveyed(name: str, kind: str, signals: _Signals, aircraft: Aircraft | None
         signals.refusal,
         signals.two_clocks,
         signals.incomplete,
-        signals.longitudinal,
+        signals.gap_lacks,
         signals.needs,
         signals.remarks,
         tuple(dict.fromkeys(to_change)),
