@@ -111,6 +111,17 @@ def test_gaps_and_unmeasured_samples_are_left_out():
     assert cut.error == pytest.approx(whole.error, rel=0.3)
 
 
+@pytest.mark.parametrize("value", [np.inf, -1e300, 1e300])
+def test_impossible_values_are_left_out(value):
+    imu, inputs = rolled(10)
+    whole = judged((imu, inputs))["roll"]
+    imu.values[::97] = value
+    inputs.values[::89] = value
+    found = judged((imu, inputs))["roll"]
+    assert found.rate == pytest.approx(whole.rate, rel=0.05)
+    assert found.error == pytest.approx(whole.error, rel=0.5)
+
+
 @pytest.mark.parametrize("count", [0, 1, 30])
 def test_too_short_a_flight_tells_nothing(count):
     signals = tuple(signal.selected(np.arange(len(signal)) < count) for signal in rolled(9))

@@ -53,6 +53,7 @@ _NOISE_ORDER = 4  # of the autoregression that makes gusts and noise white
 _MOST_INPUTS, _ROWS_A_COLUMN = 6, 5
 _SINGULAR = 1e-6  # as a share, of directions in which outputs that move together do not differ
 _UNMOVED = 1e-6  # rad, or fractions
+_POSSIBLE = 1e6  # nothing that is measured or commanded is larger, in any unit
 _BRIDGED = 0.5  # s: values further apart than this are not connected
 _NO_EFFECT = {"throttle", "flap"}  # inputs that are no cause of an axis' motion to be looked for
 
@@ -84,8 +85,7 @@ def excitation(imu: Signal, commands: LoggedCommands) -> dict[str, AxisExcitatio
     names = [commands.names[i] for i in moved]
     found = {}
     for name, axis in _AXES.items():
-        turned = imu.values[:, axis.rate]
-        rate = float(np.nanstd(turned)) if np.isfinite(turned).any() else 0.0
+        rate = _root_mean_square(imu.values[:, axis.rate])
         known = axis.control in commands.names
         movers = [i for i, one in enumerate(names) if one in axis.movers or not known]
         fitted = _responses(grid, axis, movers) if grid is not None else _unknown(len(movers))
@@ -102,15 +102,20 @@ def _is_judged(name: str, axis: _Axis, *, known: bool) -> bool:
 
 def _moved(commands: LoggedCommands) -> list[int]:
     """The places of the first six inputs that moved."""
-    spreads = [float(np.nanstd(c)) if np.isfinite(c).any() else 0.0 for c in commands.signal.values.T]
+    spreads = [_root_mean_square(column) for column in commands.signal.values.T]
     return [i for i in range(len(commands.names)) if spreads[i] > _UNMOVED][:_MOST_INPUTS]
 
 
 def _spread(commands: LoggedCommands, control: str) -> float:
     if control not in commands.names or not len(commands.signal):
         return 0.0
-    values = commands.signal.values[:, commands.names.index(control)]
-    return float(np.nanstd(values)) if np.isfinite(values).any() else 0.0
+    return _root_mean_square(commands.signal.values[:, commands.names.index(control)])
+
+
+def _root_mean_square(values: Array) -> float:
+    """That of the possible values (N,) about their mean."""
+    possible = values[np.abs(values) < _POSSIBLE]
+    return float(np.std(possible)) if possible.size else 0.0
 
 
 class _Grid(NamedTuple):
@@ -143,7 +148,7 @@ def _clean(signal: Signal) -> tuple[Array, Array]:
     fresh = np.concatenate([[True], stamp_ns[1:] > latest[:-1]]) if stamp_ns.size else np.empty(0, bool)
     time, kept = stamp_ns[fresh] / 1e9, values[fresh].astype(float)
     for column in kept.T:
-        known = np.isfinite(column)
+        known = np.abs(column) < _POSSIBLE  # not so of NaN
         column[~known] = np.interp(time[~known], time[known], column[known]) if known.any() else 0.0
     return time, kept
 
