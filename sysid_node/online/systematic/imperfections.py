@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.flight.servos import servos_of
+from sysid_node.flight.servos import Servo, servos_of
 from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression.information import Information, Spectrum, with_grams
 from sysid_node.online.regression.instruments import InstrumentModel, with_servos
@@ -34,6 +36,8 @@ THIRD = 0.05
 OF_ONE_TYPE = 0.8
 #: The longest interval (s) between a log's commands of which nothing more is unknown: 50 Hz, whose stamps scatter.
 COMPLETE = 0.02 / 0.93
+#: The largest root of a correlation by a shared damping: that of one would have no inverse.
+ALIKE = 0.99
 KNOWN = 0.03  # s: the largest 1 sigma of a servo of which something is known
 SHORTEST = 0.02  # s: the lateness from which on the tolerances of B and of the third coefficient go with it
 
@@ -79,12 +83,14 @@ def imperfections(
     found = sources(aircraft)
     unseen = _time_of_steps(command_interval) if commanded else 0.0
     servos = dict(zip(aircraft.control_symbols, servos_of(aircraft)[1:], strict=True))
-    stated = [servo_model.of_servo(servos[symbol]) for symbol in layout.timed]
-    rows, unknown = ([], []) if positions else _uncertain_servos(aircraft, layout, stated, unseen, commanded=commanded)
+    of_controls = [servos[symbol] for symbol in layout.timed]
+    stated = [servo_model.of_servo(servo) for servo in of_controls]
+    rows = [] if positions else _uncertain_servos(aircraft, layout, of_controls, unseen, commanded=commanded)
     if not found and not rows:
         return None
     columns = ServoColumns.of(layout)
-    controls, timed, expected, sigmas = zip(*rows, strict=True) if rows else ((), (), (), ())
+    controls, timed, expected, sigmas, damped, silent = zip(*rows, strict=True) if rows else ((),) * 6
+    unknown = np.flatnonzero(silent)
     applied = np.array(stated).reshape(-1, 3) if commanded else np.zeros((len(layout.timed), 3))
     return Imperfections(
         found,
@@ -93,8 +99,8 @@ def imperfections(
         ServoModel(*applied.T.copy()),
         np.array(expected),
         np.array(sigmas),
-        np.array(unknown, np.intp),
-        _precision(len(found), len(rows), unknown),
+        unknown,
+        _precision(len(found), unknown, np.array(damped)),
         columns,
         math.hypot(unseen, *(aircraft.tolerances.get(f"delays.{topic}", 0.0) for topic in ("actuators", "imu"))),
         unseen,
@@ -102,33 +108,50 @@ def imperfections(
     )
 
 
-def _uncertain_servos(
-    aircraft: Aircraft,
-    layout: SignalLayout,
-    stated: list[tuple[float, float, float]],
-    unseen: float,
-    *,
-    commanded: bool,
-) -> tuple[list[tuple[str, int, float, float]], list[int]]:
-    """Of each servo that is not exactly known its name, place, expected lateness and 1 sigma (s) beyond the file's.
+class _UncertainServo(NamedTuple):
+    """A servo that is not exactly known."""
 
-    Behind them the places, among these, of the servos of which the file is silent. ``unseen`` (s): 1 sigma of the time
-    of steps.
+    control: str
+    place: int
+    expected: float  # s: lateness beyond the file's
+    sigma: float  # s: its 1 sigma about that
+    damped: float  # share of the 1 sigma that it has by the damping, which all controls share
+    silent: bool  # whether the file says nothing of it
+
+
+def _uncertain_servos(
+    aircraft: Aircraft, layout: SignalLayout, servos: Sequence[Servo], unseen: float, *, commanded: bool
+) -> list[_UncertainServo]:
+    """Those of the controls' ``servos`` (m,) that are not exactly known.
+
+    ``unseen`` (s): 1 sigma of the time of steps.
     """
     names = {control.symbol: name for name, control in aircraft.controls.items()}
-    rows: list[tuple[str, int, float, float]] = []
-    unknown = []
-    for place, symbol in enumerate(layout.timed):
-        name = names[symbol]
-        sigma = math.hypot(*(aircraft.tolerances.get(f"{effect}.{name}", 0.0) for effect in _SERVO_EFFECTS))
+    rows = []
+    for place, (symbol, servo) in enumerate(zip(layout.timed, servos, strict=True)):
+        name, stated = names[symbol], servo_model.of_servo(servo)[0]
+        sigma, damped = _lag_sigma(aircraft, name, servo)
+        sigma = math.hypot(sigma, aircraft.tolerances.get(f"command_delay.{name}", 0.0))
         if not commanded:
-            sigma = math.hypot(sigma, stated[place][0])
-        if math.hypot(sigma, unseen) > 0.0:
-            if commanded and stated[place][0] == 0.0 and sigma > KNOWN:
-                unknown.append(len(rows))
-            mean, spread = _later(stated[place][0], sigma) if commanded else (0.0, sigma)
-            rows.append((name, place, mean, math.hypot(spread, unseen)))
-    return rows, unknown
+            sigma = math.hypot(sigma, stated)
+        whole = math.hypot(sigma, unseen)
+        if whole > 0.0:
+            silent = commanded and stated == 0.0 and sigma > KNOWN
+            mean, spread = _later(stated, sigma) if commanded else (0.0, sigma)
+            rows.append(_UncertainServo(name, place, mean, math.hypot(spread, unseen), damped / whole, silent))
+    return rows
+
+
+def _lag_sigma(aircraft: Aircraft, name: str, servo: Servo) -> tuple[float, float]:
+    """1 sigma (s) of a lag's lateness by the file's tolerances, and the part of it that is the damping's.
+
+    The lateness is T of first order and 2 d T of second order (``servo_model``), to first order in both tolerances.
+    """
+    of_time = aircraft.tolerances.get(f"actuator_lag.{name}", 0.0)
+    if not servo.damping:
+        return of_time, 0.0
+    damped = 2.0 * servo.time_constant * aircraft.tolerances.get("actuator_lag.damping", 0.0)
+    return math.hypot(2.0 * servo.damping * of_time, damped), damped
 
 
 def _later(stated: float, sigma: float) -> tuple[float, float]:
@@ -147,15 +170,18 @@ def _time_of_steps(interval: float) -> float:
     return interval / math.sqrt(12.0) if interval > COMPLETE else 0.0
 
 
-def _precision(sources: int, servos: int, unknown: list[int]) -> Array:
-    """(K, K) where the lateness of the ``unknown`` of the servos has a part in common."""
-    correlation = np.eye(sources + 3 * servos)
-    places = sources + np.array(unknown, np.intp)
+def _precision(sources: int, unknown: Index, damped: Array) -> Array:
+    """(K, K) where the lateness of the ``unknown`` of the m servos has a part in common.
+
+    So has that of servos of second order by their damping, which is the share ``damped`` (m,) of their 1 sigma.
+    """
+    correlation = np.eye(sources + 3 * damped.size)
+    places = sources + unknown
     correlation[np.ix_(places, places)] += OF_ONE_TYPE * (1.0 - np.eye(places.size))
+    alike = np.minimum(damped, ALIKE)
+    servos = slice(sources, sources + damped.size)
+    correlation[servos, servos] += np.outer(alike, alike) - np.diag(alike**2)
     return np.asarray(np.linalg.inv(correlation))
-
-
-_SERVO_EFFECTS = ("actuator_lag", "command_delay")
 
 
 def line_model(
