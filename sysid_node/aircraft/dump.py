@@ -32,7 +32,7 @@ def dump_aircraft(aircraft: Aircraft) -> str:
     lines += [f"mass: {_quantity(aircraft.mass, 'mass', stated)}  # kg"]
     lines += _inertia(asdict(aircraft.inertia), stated)
     lines += [f"geometry: {_flow(asdict(aircraft.geometry), 'geometry', stated)}  # m^2, m, m"]
-    lines += [f"reference: {_flow(asdict(aircraft.reference))}  # m/s, kg/m^3", "controls:"]
+    lines += [f"reference: {_flow(asdict(aircraft.reference), 'reference', stated)}  # m/s, kg/m^3", "controls:"]
     lines += [f"  {_text(name)}: {{{_control(control, stated)}}}" for name, control in aircraft.controls.items()]
     if aircraft.throttle is not None:
         lines += [f"  throttle: {{{_throttle(aircraft.throttle, stated)}}}"]

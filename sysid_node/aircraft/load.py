@@ -77,7 +77,7 @@ def parse_aircraft(text: str, file: str = "<text>") -> Aircraft:
         mass=quantities.read(fields["mass"], "mass", positive("kg")),
         inertia=read_inertia(fields.get("inertia"), quantities, ideal=ideal),
         geometry=read_geometry(fields["geometry"], quantities),
-        reference=read_reference(fields["reference"]),
+        reference=read_reference(fields["reference"], quantities),
         controls=controls,
         derivatives=derivatives,
         throttle=throttle,

@@ -174,6 +174,12 @@ class Aircraft:
         """
         return MappingProxyType(tolerances(_sizes(self), _stated(self), ideal=self.ideal))
 
+    @property
+    def stamp_delays(self) -> dict[str, UncertainValue]:
+        """How late each topic's stamps are, s: the file's ``delays``, or the effects that mean the same."""
+        effects = {topic: self.effects.get(effect, {}).get("delay") for topic, effect in DELAY_EFFECTS.items()}
+        return {topic: effects[topic] or delay for topic, delay in self.delays.items()}
+
     def effect_values(self) -> dict[str, dict[str, float]]:
         """The values of the file's effects by effect and parameter, its delays included."""
         values = {name: {key: item.value for key, item in items.items()} for name, items in self.effects.items()}
@@ -182,6 +188,9 @@ class Aircraft:
                 values[DELAY_EFFECTS[topic]] = {"delay": delay.value}
         return values
 
+
+#: Under which the file's tolerance of the air density is stored, kg/m^3.
+_DENSITY = "reference.air_density"
 
 #: Effects that describe errors of instruments and of the CG: every aircraft has them within a tolerance.
 _INSTRUMENT_ERRORS = ("imu_scale", "imu_misalignment", "airspeed_scale", "vane_scale", "air_data_lag", "cg_shift")
@@ -218,10 +227,12 @@ def _stated(aircraft: Aircraft) -> dict[str, float]:
     unknown = 0.0 if aircraft.ideal else UNKNOWN_SERVO_LAG
     stated |= {f"actuator_lag.{name}": unknown for name in aircraft.controls if name not in known}
     stated |= {key: value for key, value in aircraft.stated_tolerances.items() if ".joints." not in key}
+    if _DENSITY in stated:
+        stated["air_density"] = stated.pop(_DENSITY) / aircraft.reference.air_density
     for name, control in aircraft.controls.items():
         scale = _relative_scale(control, aircraft.stated_tolerances)
         stated |= {f"controls.{name}.scale": scale} if scale is not None else {}
-    uncertain = {f"delays.{topic}": delay for topic, delay in aircraft.delays.items()}
+    uncertain = {f"delays.{topic}": delay for topic, delay in aircraft.stamp_delays.items()}
     for effect, values in aircraft.effects.items():
         uncertain |= {f"{effect}.{key}": item for key, item in values.items()}
     return stated | {key: item.tolerance for key, item in uncertain.items() if item.tolerance is not None}

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.stated_effects import not_taken_in_words
 from sysid_node.batch.data_compatibility import check_sensors, corrected
 from sysid_node.batch.methods.constrained_least_squares import FORGETTING, WINDOW, constrained_least_squares
 from sysid_node.batch.methods.equation_error import equation_error
@@ -28,6 +29,7 @@ from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.batch.systematic.flight_posterior import FlightPosterior, flight_posterior
 from sysid_node.batch.systematic.sensitivities import LikelihoodResponse, RegressionResponse, Response
+from sysid_node.batch.systematic.stated_errors import without_stated_errors
 from sysid_node.batch.systematic.systematic_errors import on_time, with_systematic_errors
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
@@ -128,7 +130,8 @@ def _prepared(
     settings: BatchSettings,
 ) -> _PreparedFlights:
     """What is fitted: the flights after all corrections that the settings and the aircraft file ask for."""
-    remarks: list[str] = []
+    remarks = [told] if (told := not_taken_in_words(aircraft)) else []
+    records, holdout = ([without_stated_errors(aircraft, one) for one in some] for some in (records, holdout))
     selections: Mapping[str, StepwiseSelection] = {}
     if settings.correct_sensors:
         found = check_sensors(aircraft, records, settings.segment or 10.0)

@@ -62,13 +62,17 @@ def read_geometry(entry: DocumentEntry, quantities: Quantities) -> Geometry:
     return Geometry(S, b, cbar)
 
 
-def read_reference(entry: DocumentEntry) -> ReferenceCondition:
+def read_reference(entry: DocumentEntry, quantities: Quantities) -> ReferenceCondition:
     """The flight condition of the derivatives. Raises InputError."""
     fields = entry.fields({"airspeed": "the true airspeed in m/s", "air_density": "the air density in kg/m^3"})
     return ReferenceCondition(
         airspeed=positive("m/s", *AIRSPEEDS)(fields["airspeed"]),
-        air_density=fields["air_density"].number("an air density (0.001 to 2 kg/m^3)", lambda x: 1e-3 <= x < 2),
+        air_density=quantities.read(fields["air_density"], "reference.air_density", _density),
     )
+
+
+def _density(entry: DocumentEntry) -> float:
+    return entry.number("an air density (0.001 to 2 kg/m^3)", lambda x: 1e-3 <= x < 2)
 
 
 def read_sensors(entry: DocumentEntry | None, quantities: Quantities) -> Sensors:

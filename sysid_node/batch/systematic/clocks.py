@@ -55,11 +55,11 @@ def corrected(aircraft: Aircraft, record: FlightRecord, values: Mapping[Imperfec
             columns[control.symbol] = _followed(aircraft, record, name, servo)
     for column, delay in late.items():
         if column in columns:
-            columns[column] = _read_later(record.time, columns[column], delay)
+            columns[column] = read_later(record.time, columns[column], delay)
     return replace(record, columns=columns)
 
 
-def _read_later(time: Array, values: Array, delay: float) -> Array:
+def read_later(time: Array, values: Array, delay: float) -> Array:
     """The signal ``delay`` s later; what is missing remains so."""
     known = np.isfinite(values)
     if delay == 0.0 or np.count_nonzero(known) < 4:

@@ -8,7 +8,8 @@ sample may need of the messages before it is held, so that memory does not depen
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stamps, Streams
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online.alignment import streaming
+from sysid_node.online.alignment.stated_errors import StatedErrors
 from sysid_node.online.alignment.streaming import KEPT_BUFFERS, AlignedSample, AlignmentState
 from sysid_node.online.types import SAMPLE_COLUMNS
 
@@ -96,7 +98,7 @@ class PieceAlignment:
         self, aircraft: Aircraft, max_gap: float, carried: str = "positions", *, by_message: bool = False
     ) -> None:
         self._aircraft, self._max_gap, self._carried = aircraft, max_gap, carried
-        self._actuation = Actuation.of(aircraft)
+        self._actuation, self._errors = Actuation.of(aircraft), StatedErrors.of(aircraft)
         self._commands = commands_of(aircraft, carried)
         nothing = Accepted(np.empty(0, np.int64), np.empty((0, 0)), np.empty(0, np.int64))
         self._held = [nothing] * len(TOPICS)
@@ -146,13 +148,21 @@ class PieceAlignment:
         return aligned
 
     def _screened(self, piece: Streams) -> list[ScreenedMessages]:
-        """What is accepted of a piece."""
+        """What is accepted of a piece, without the errors that the aircraft file states."""
         controls, faults = self._actuation.of_array(piece.actuators.names, piece.actuators.positions)
-        last = [int(held.stamps[-1]) if held.stamps.size else None for held in self._held]
-        return [
+        late = (0, *self._errors.late.values())
+        last = [int(h.stamps[-1]) + by if h.stamps.size else None for h, by in zip(self._held, late, strict=True)]
+        found = [
             screen(piece.imu.arrival, piece.imu.values, imu_faults(piece.imu.values), last[0]),
             screen_air_data(self._aircraft, piece.air_data, last[1]),
             screen(piece.actuators.arrival, controls, faults, last[2]),
+        ]
+        if self._errors.none:
+            return found
+        corrected = [_by_column(self._errors.imu, found[0].values), _by_column(self._errors.air_data, found[1].values)]
+        values = (*corrected, found[2].values)
+        return [
+            replace(one, stamps=one.stamps - by, values=each) for one, by, each in zip(found, late, values, strict=True)
         ]
 
     def _neighbours(self, imu: Accepted, others: Sequence[Accepted], last: bool) -> _Neighbours | None:
@@ -298,6 +308,11 @@ class PieceAlignment:
         begin = int(np.searchsorted(time, state.commands_from))
         stamps = np.array(sources, np.int64)
         return AlignedSamples(time, samples.reshape(len(complete), width), state.rejected, stamps, wait, begin)
+
+
+def _by_column(change: Callable[[tuple[Array, ...]], tuple[Array, ...]], values: Array) -> Array:
+    """Values (N, K), changed by columns."""
+    return np.column_stack(change(tuple(values.T)))
 
 
 def _rows(messages: Accepted) -> tuple[list[int], list[tuple[float, ...]]]:

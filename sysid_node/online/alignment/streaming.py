@@ -4,7 +4,8 @@ The live node and the replay both feed this. Each message is checked (``flight.c
 stamp), and every IMU message waits until air data and actuators stamped after it have come, so that both are
 interpolated and never held (``flight.align`` says why); only commands are held (``flight.commanded``). What comes out
 depends on the stamps alone, not on the order in which topics arrive, as long as none is more than the buffer (5 s)
-behind; a replay therefore equals the live run.
+behind; a replay therefore equals the live run. Errors of the instruments and delays of the stamps that the aircraft
+file states are taken out of every message that is accepted (``stated_errors``).
 
 A stamp that leaps (back by more than 1 s, ahead by more than 5 min) is left out; if the next message follows it, the
 clock was set, and a new time base begins: the samples' time goes on after a break longer than ``max_gap``, which
@@ -38,6 +39,7 @@ from sysid_node.flight.checks import (
 )
 from sysid_node.flight.commanded import RecordedCommands, commands_of, deflections, follows, take_command
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
+from sysid_node.online.alignment.stated_errors import StatedErrors
 
 FOLLOWS_NS = 1_000_000_000  # a message this soon after a leap of the stamps confirms it
 BREAK_NS = 1_000_000_000  # beyond max_gap: the break in the samples' time where a clock was set
@@ -125,6 +127,7 @@ class _Neighbours:
     """Recent messages of a topic that is interpolated."""
 
     topic: str
+    late: int = 0  # ns, by which its stamps are later than the IMU's
     clock: _Clock = field(default_factory=_Clock)
     entries: deque[_Entry] = field(default_factory=deque)
     newest: _Entry | None = None
@@ -149,6 +152,7 @@ class AlignmentState:
     air_density: float
     gap: int  # ns
     buffer: int  # ns
+    errors: StatedErrors = field(default_factory=StatedErrors)
     imu: _ImuMessages = field(default_factory=_ImuMessages)
     air_data: _Neighbours = field(default_factory=lambda: _Neighbours(AIR_DATA))
     actuators: _Neighbours = field(default_factory=lambda: _Neighbours(ACTUATORS))
@@ -165,7 +169,9 @@ def init(aircraft: Aircraft, max_gap: float, carried: str = "positions") -> Alig
     ``carried`` says what the topic ``actuators`` carries.
     """
     actuation = Actuation.of(aircraft)
-    state = AlignmentState(actuation, aircraft.reference.air_density, gap_ns(max_gap), buffer_ns(max_gap))
+    errors = StatedErrors.of(aircraft)
+    state = AlignmentState(actuation, aircraft.reference.air_density, gap_ns(max_gap), buffer_ns(max_gap), errors)
+    state.air_data.late, state.actuators.late = errors.air_data_late, errors.actuators_late
     state.joints = ((), actuation.places(()))
     state.commands = commands_of(aircraft, carried)
     return state
@@ -187,7 +193,7 @@ def on_imu(state: AlignmentState, stamp_ns: int, values: Values) -> list[Aligned
         imu.bases.append(_Base(epoch, imu.since + state.gap + BREAK_NS if epoch else 0, stamp_ns))
     base = imu.bases[-1]
     imu.since = base.since + (stamp_ns - base.stamp)
-    waiting.append(_Waiting(epoch, stamp_ns, imu.since, values))
+    waiting.append(_Waiting(epoch, stamp_ns, imu.since, state.errors.imu(values)))
     # where another of this epoch waits already, it waits for another topic, and still does
     waits = len(waiting) > 1 and waiting[-2].epoch == epoch
     complete = [] if waits else _release(state)
@@ -205,7 +211,7 @@ def on_air_data(state: AlignmentState, stamp_ns: int, values: Values) -> list[Al
     """
     fault = air_data_fault(values)
     V, alpha, beta, rho = values
-    known = (V, alpha, beta, state.air_density if is_nan(rho) else rho)
+    known = state.errors.air_data((V, alpha, beta, state.air_density if is_nan(rho) else rho))
     return _on_neighbour(state, state.air_data, stamp_ns, fault or known)
 
 
@@ -244,7 +250,10 @@ def go_on_from(state: AlignmentState, first: int, last: int, waiting: Sequence[i
 
 
 def go_on_after(state: AlignmentState, topic: str, stamps: Sequence[int], values: Sequence[Values]) -> None:
-    """Put a fresh alignment where the last messages of a topic with neighbours brought it; stamps in ns."""
+    """Put a fresh alignment where the last messages of a topic with neighbours brought it.
+
+    ``stamps`` (ns) and ``values`` are without the stated errors.
+    """
     neighbours = state.air_data if topic == AIR_DATA else state.actuators
     before = [*stamps[:1], *stamps[:-1]]
     spans = (min(now - last, state.gap) for now, last in zip(stamps, before, strict=True))
@@ -252,7 +261,7 @@ def go_on_after(state: AlignmentState, topic: str, stamps: Sequence[int], values
     if entries:
         horizon = stamps[-1] - KEPT_BUFFERS * state.buffer
         neighbours.entries.extend(entry for entry in entries if entry.stamp >= horizon)
-        neighbours.newest, neighbours.clock.last = entries[-1], stamps[-1]
+        neighbours.newest, neighbours.clock.last = entries[-1], stamps[-1] + neighbours.late
 
 
 def _on_neighbour(
@@ -268,6 +277,7 @@ def _on_neighbour(
         refuse(state, topic.topic, str(fault))
         return []
     state.accepted[topic.topic] += 1
+    stamp -= topic.late
     entries, epoch = topic.entries, topic.clock.epoch
     before = topic.newest if topic.newest is not None and topic.newest.epoch == epoch else None
     topic.newest = _Entry(epoch, stamp, min(stamp - before.stamp, state.gap) if before else 0, values)

@@ -27,8 +27,8 @@ SHORT = 0.3  # standard errors: a step within which the signals are linear enoug
 #: Share of its standard error, and time (s), by which a servo's lateness must change for the lines to be changed, too:
 #: smaller changes are exact enough to second order. None is above ``NOTABLE_MOST`` s.
 NOTABLE_SHARE, NOTABLE, NOTABLE_MOST = 0.5, 5e-4, 0.02
-#: Tolerances by which an imperfection is taken out of the signals at most: signals change in proportion to small
-#: imperfections only.
+#: Tolerances about its expected value by which an imperfection is taken out of the signals at most: signals change in
+#: proportion to small imperfections only.
 LARGEST_CORRECTION = 6.0
 EVERY = 4  # pieces between looks, once there are ``EARLY`` s of data
 EARLY = 10.0
@@ -167,10 +167,11 @@ def to_take_out(imperfect: Imperfections, servos: ServoModel, last: SystematicEr
     """(K,) the imperfections as last estimated, beyond where the lines have the ``servos`` by now."""
     at, S, m = imperfect.timed, len(imperfect.sources), len(imperfect.controls)
     if last is None:
-        return np.zeros(S + 3 * m)
+        return np.array([*(source.stated for source in imperfect.sources), *np.zeros(3 * m)])
     late, curved = last.servos.lateness[at] - servos.lateness[at], last.servos.curvature[at] - servos.curvature[at]
-    most = LARGEST_CORRECTION * prior(imperfect, servos)[0][:S]
-    sources = np.clip(last.considered.estimate[:S], -most, most)
+    sigmas, expected = (each[:S] for each in prior(imperfect, servos))
+    most = LARGEST_CORRECTION * sigmas
+    sources = np.clip(last.considered.estimate[:S], expected - most, expected + most)
     return np.concatenate([sources, late, curved, last.considered.estimate[S + 2 * m :]])
 
 

@@ -1,9 +1,10 @@
 """The imperfections that an aircraft may have within its tolerances, each with what it does to the signals.
 
-An imperfection is a number with zero mean and the 1 sigma of ``Aircraft.tolerances``: the true quantity less the one
-that was taken. They are the "consider parameters" of Schmidt (1966) and Bierman ("Factorization Methods for Discrete
-Sequential Estimation", 1977, ch. VIII), with tolerances by type B evaluation (GUM: JCGM 100:2008, sec. 4.3). To first
-order each changes the signals linearly; signs are those of a quantity that is larger than was taken.
+An imperfection is the true quantity less the one that was taken, with the 1 sigma of ``Aircraft.tolerances``. Its mean
+is zero; that of a lag, or of a shift of the CG, for which no reading can be corrected, is what the file states. They
+are the "consider parameters" of Schmidt (1966) and Bierman ("Factorization Methods for Discrete Sequential Estimation",
+1977, ch. VIII), with tolerances by type B evaluation (GUM: JCGM 100:2008, sec. 4.3). To first order each changes the
+signals linearly; signs are those of a quantity that is larger than was taken.
 """
 
 from __future__ import annotations
@@ -13,9 +14,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.stated_effects import sizes_as_uncertainty
 from sysid_node.online.systematic.column_changes import AXES, FORCES, RATES, ColumnChanges, Terms
 
 Change = Callable[[ColumnChanges, str, str], None]
+
+#: Share of a stated value that its 1 sigma is at least: an exact value must be taken out of the signals, too.
+SMALLEST = 1e-3
 
 _MOMENTS = {"Cl": "p", "Cm": "q", "Cn": "r"}
 _COEFFICIENTS = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
@@ -28,6 +33,7 @@ class ErrorSource:
     key: str
     sigma: float
     expected: float = 0.0
+    stated: float = 0.0  # by the aircraft file, where the alignment has not taken it out: where the estimate begins
 
     @property
     def kind(self) -> str:
@@ -38,25 +44,31 @@ class ErrorSource:
 def sources(aircraft: Aircraft, *, vanes: bool = True) -> tuple[ErrorSource, ...]:
     """All imperfections of an aircraft but its servos; without those of the flow angles where no ``vanes`` are."""
     found = []
-    for key, sigma in aircraft.tolerances.items():
-        source = ErrorSource(key, float(sigma))
-        change = _change_of(source)
-        if sigma > 0.0 and math.isfinite(sigma) and change is not None and (vanes or source.kind not in _FLOW):
-            found.append(_never_early(aircraft, source) if key in _LATE_ONLY else source)
+    sizes = sizes_as_uncertainty(aircraft)
+    for key, tolerance in (dict.fromkeys(sizes, 0.0) | dict(aircraft.tolerances)).items():
+        source = _expected(aircraft, key, math.hypot(tolerance, sizes[key]) if key in sizes else float(tolerance))
+        seen = _change_of(source) is not None and (vanes or source.kind not in _FLOW)
+        if source.sigma > 0.0 and math.isfinite(source.sigma) and seen:
+            found.append(source)
     bias = aircraft.noise_bias.get("airspeed", 0.0)
     if bias > 0.0 and not (aircraft.ideal and "noise.bias.airspeed" not in aircraft.stated_tolerances):
         found.append(ErrorSource("airspeed_bias", bias))
     return tuple(found)
 
 
-def _never_early(aircraft: Aircraft, source: ErrorSource) -> ErrorSource:
-    """The same of what delays and never hastens."""
-    effect, _, parameter = source.key.rpartition(".")
-    applied = effect == "delays"  # what the file states of it has been taken out by the alignment
-    stated = aircraft.delays[parameter] if applied else aircraft.effects.get(effect, {}).get(parameter)
-    value = stated.value if stated else 0.0
-    mean, sigma = not_negative(value, source.sigma)
-    return ErrorSource(source.key, sigma, mean - value if applied else mean)
+def _expected(aircraft: Aircraft, key: str, sigma: float) -> ErrorSource:
+    """A source about what the file states of it.
+
+    What the file states of stamps and of the instruments' readings has been taken out by the alignment.
+    """
+    effect, _, parameter = key.rpartition(".")
+    item = aircraft.effects.get(effect, {}).get(parameter) if effect in _IN_THE_MODEL else None
+    stated = item.value if item else 0.0
+    if key not in _LATE_ONLY or sigma == 0.0:
+        return ErrorSource(key, max(sigma, SMALLEST * abs(stated)), stated, stated)
+    taken_out = aircraft.stamp_delays[parameter].value if effect == "delays" else 0.0
+    mean, spread = not_negative(stated + taken_out, sigma)
+    return ErrorSource(key, spread, mean - taken_out, stated)
 
 
 def not_negative(mean: float, sigma: float) -> tuple[float, float]:
@@ -344,4 +356,6 @@ CHANGES: Mapping[str, Change] = {
 }
 #: Lags and low-pass filters, which make a signal late.
 _LATE_ONLY = ("air_data_lag.time_constant", "delays.imu")
+#: What is estimated from where the file has it, as no reading can be corrected for it.
+_IN_THE_MODEL = ("air_data_lag", "cg_shift")
 _FLOW = ("vane_scale", "vane_bias", "sensors.air_data", "air_data_lag")

@@ -9,10 +9,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_flights import made_aircraft, made_streams
 
+from sysid_node.aircraft.model import UncertainValue
 from sysid_node.flight.streams import Arrival, Streams
 from sysid_node.online.alignment.in_pieces import PieceAlignment
 
 AIRCRAFT = made_aircraft()
+#: Its file states errors of the instruments, and stamps that are late.
+STATING = dataclasses.replace(
+    AIRCRAFT,
+    delays={topic: UncertainValue(x) for topic, x in (("imu", 0.02), ("air_data", -0.013), ("actuators", 0.25))},
+    effects={
+        "imu_bias": {"q": UncertainValue(0.01)},
+        "imu_scale": {"az": UncertainValue(0.1)},
+        "imu_misalignment": {"roll": UncertainValue(0.1), "yaw": UncertainValue(-0.05)},
+        "airspeed_scale": {"error": UncertainValue(0.07)},
+        "vane_bias": {"alpha": UncertainValue(0.02)},
+    },
+)
 
 
 def cut(streams: Streams, shares) -> list[Streams]:
@@ -51,11 +64,11 @@ def together(pieces, alignment):
     )
 
 
-def assert_same_bits(streams, max_gap=0.2, carried="positions", shares=(0.1, 0.35, 0.36, 0.8)):
-    wanted = together([streams], PieceAlignment(AIRCRAFT, max_gap, carried, by_message=True))
-    assert together([streams], PieceAlignment(AIRCRAFT, max_gap, carried)) == wanted
-    assert together(cut(streams, shares), PieceAlignment(AIRCRAFT, max_gap, carried)) == wanted
-    return PieceAlignment(AIRCRAFT, max_gap, carried).take(streams, last=True)
+def assert_same_bits(streams, max_gap=0.2, carried="positions", shares=(0.1, 0.35, 0.36, 0.8), aircraft=AIRCRAFT):
+    wanted = together([streams], PieceAlignment(aircraft, max_gap, carried, by_message=True))
+    assert together([streams], PieceAlignment(aircraft, max_gap, carried)) == wanted
+    assert together(cut(streams, shares), PieceAlignment(aircraft, max_gap, carried)) == wanted
+    return PieceAlignment(aircraft, max_gap, carried).take(streams, last=True)
 
 
 def is_regular(streams, max_gap=0.2):
@@ -96,9 +109,10 @@ def with_steps(streams: Streams, every: int) -> Streams:
 
 @pytest.mark.parametrize("carried", ["commands", "auto"])
 @pytest.mark.parametrize("every", [7, 1000])
-def test_commands(carried, every):
+@pytest.mark.parametrize("aircraft", [AIRCRAFT, STATING])
+def test_commands(carried, every, aircraft):
     """Servos follow the commands in the same bits; where nothing jumps, ``auto`` interpolates positions."""
-    bulk = assert_same_bits(with_steps(made_streams(3.0, 1), every), 0.2, carried)
+    bulk = assert_same_bits(with_steps(made_streams(3.0, 1), every), 0.2, carried, aircraft=aircraft)
     assert (bulk.commands_from == 0) == (carried == "commands")
     assert (bulk.commands_from < bulk.time.size) == (carried == "commands" or every == 7)
 
@@ -182,8 +196,9 @@ faults = st.lists(st.tuples(st.integers(0, 1000), st.sampled_from(SHIFTS), st.bo
     st.integers(0, 9),
     st.sampled_from(["positions", "commands", "auto"]),
     st.lists(st.floats(0.0, 1.0), max_size=4),
+    st.sampled_from([AIRCRAFT, STATING]),
 )
-def test_recordings_of_any_kind(seed, wrong, shuffled, order_seed, carried, shares):
+def test_recordings_of_any_kind(seed, wrong, shuffled, order_seed, carried, shares, aircraft):
     """Repeated, absent, leaping and disordered stamps; topics that arrive in any order."""
     streams = made_streams(0.5, seed=seed)
     lengths = [len(stream.arrival) for stream in streams.by_topic.values()]
@@ -202,4 +217,5 @@ def test_recordings_of_any_kind(seed, wrong, shuffled, order_seed, carried, shar
                 rng.shuffle(arrival.stamp_ns[3:9])
 
         streams = changed(streams, topic, spoil)
-    assert_same_bits(with_steps(streams, 4) if carried == "auto" else streams, carried=carried, shares=shares)
+    streams = with_steps(streams, 4) if carried == "auto" else streams
+    assert_same_bits(streams, carried=carried, shares=shares, aircraft=aircraft)
