@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.stated_effects import as_estimated, not_taken_in_words
 from sysid_node.api.estimated_run import EstimatedRun
 from sysid_node.api.flight_file import FlightFile
 from sysid_node.errors import InputError
@@ -83,7 +84,7 @@ class Replay(EstimatedRun):
         # While the estimator settles nothing is included yet, and estimates have the same time.
         shown = {estimates.time: estimates for estimates in (*self.history[every - 1 :: every], self.final)}
         commanded = math.isfinite(self.commands_from)
-        carried = carried_in_words(self.aircraft, self.settings.actuators, commanded)
+        said = (carried_in_words(self.aircraft, self.settings.actuators, commanded), not_taken_in_words(self.aircraft))
         result = replay_result(
             self.aircraft,
             self.settings,
@@ -93,7 +94,7 @@ class Replay(EstimatedRun):
             truth=self.truth.values,
             truth_since=self.truth.since,
             faults=self.faults,
-            remarks=[*flow_angle_filter.remarks(self.flow), *([carried] if carried else [])],
+            remarks=[*flow_angle_filter.remarks(self.flow), *filter(None, said)],
         )
         publishing = {"publish_rate": self.publish_rate, "actuators_carry": "commands" if commanded else "positions"}
         return replace(result, settings={**result.settings, **publishing})
@@ -171,7 +172,8 @@ class _Run:
         self.state, self.schedule = estimator.init(aircraft, settings), schedule.Schedule(publish_rate)
         self.monitor = RecordedMonitor(aircraft, FaultSettings()) if judge_faults else None
         self.history, self.stamps = EstimatesLog(), array("q")
-        self.samples, self.flow = RecordedSamples(aircraft, flight.imu_messages), flow_angle_filter.init(aircraft)
+        self.samples = RecordedSamples(aircraft, flight.imu_messages)
+        self.flow = flow_angle_filter.init(as_estimated(aircraft))
         self.attitudes = _Attitudes()
         self.spans: dict[str, tuple[float, float]] = {}  # s, by topic
         self.joints: tuple[str, ...] = ()

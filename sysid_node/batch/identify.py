@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.aircraft.stated_effects import not_taken_in_words
+from sysid_node.aircraft.stated_effects import as_estimated, not_taken_in_words
 from sysid_node.batch.data_compatibility import check_sensors, corrected
 from sysid_node.batch.methods.constrained_least_squares import FORGETTING, WINDOW, constrained_least_squares
 from sysid_node.batch.methods.equation_error import equation_error
@@ -96,7 +96,7 @@ def identify(
         raise InputError(f"method {method!r}: expected one of {', '.join(METHODS)}")
     if not records:
         raise InputError("no flight to identify from; give at least one")
-    flights = _prepared(aircraft, _named(records), _named(holdout), settings)
+    flights = _prepared(as_estimated(aircraft), _named(records), _named(holdout), settings)
     fit, predict = _fitted_with_systematic_errors(method, flights, settings)
     figures: FiguresByFlight = {}
     for record in flights.holdout:

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.stated_effects import as_estimated
 from sysid_node.faults import monitor
 from sysid_node.faults.hypotheses import rate_limits, servo_times
 from sysid_node.faults.hypotheses import servo_check as servos
@@ -63,6 +64,7 @@ class MessageWatch:
 
 def init(aircraft: Aircraft, settings: FaultMonitorSettings, stale_after: float) -> MessageWatch:
     """A monitor before the first message. A topic that falls silent for ``stale_after`` s is a fault."""
+    aircraft = as_estimated(aircraft)
     taken = intake.init(aircraft, blocks.MOST_GAP)
     forces, positions = monitor.init(aircraft, settings), servos.init(aircraft, settings)
     limits = rate_limits.init(aircraft, forces.terms)

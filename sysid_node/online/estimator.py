@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.stated_effects import as_estimated
 from sysid_node.errors import InputError
 from sysid_node.flight.checks import AIRSPEED_LOW, DENSITY_LOW
 from sysid_node.online import pending_renewal
@@ -63,6 +64,7 @@ def init(
     ``commanded``: whether the samples' deflections follow from commands (``flight.commanded``), which a log holds every
     ``command_interval`` (s; ``JointStream.interval``).
     """
+    aircraft = as_estimated(aircraft)
     grid = fourier_transform.lines(*settings.frequencies)
     model = _model(aircraft, settings, grid.omega, commanded, command_interval)
     layout, equations, imperfect = model.layout, model.equations, model.imperfections

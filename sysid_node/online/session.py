@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import counts_by_reason
+from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.online import estimator
 from sysid_node.online.alignment import schedule, streaming
@@ -52,6 +53,16 @@ class Session:
         self._heard = time.monotonic()
         self._published = -math.inf  # s, time.perf_counter when estimates last fell due
         self._free = (1.0 - BUSY) / self.publish_rate  # s after that in which there is time
+
+    @property
+    def commanded(self) -> bool:
+        """Whether the estimates take the deflections from commands, and not from measured positions."""
+        return self.state.model.sample.commanded
+
+    @property
+    def carried(self) -> str:
+        """What the actuators' messages are taken for, in words; empty where the user said that they are positions."""
+        return carried_in_words(self.aircraft, self.settings.actuators, self.commanded)
 
     @property
     def rejected(self) -> dict[str, int]:

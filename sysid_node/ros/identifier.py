@@ -21,6 +21,7 @@ from sysid_msgs.msg import AirData, DerivativeEstimates, EstimateCorrelation, Mo
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.stated_effects import not_taken_in_words
 from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
 from sysid_node.flight.cdr.message_reader import MessageReader, Text
@@ -93,6 +94,7 @@ class Identifier(CarefulNode):
         self._monitors = {topic: TopicMonitor(topic) for topic in (IMU, AIR_DATA, ACTUATORS)}
         self._recent, self._conditions = RecentCounts(), Conditions()
         self._joints: Text = ()  # the names of the last message about actuators
+        self._carried = ""  # what was last said of the actuators' messages
         self._serialiser = EstimatesSerialiser(fields_of, aircraft.name, self._session.settings.method)
         self._inputs = [
             self._listen(Imu, IMU, self._on_imu),
@@ -100,6 +102,8 @@ class Identifier(CarefulNode):
             self._listen(JointState, ACTUATORS, self._on_actuators),
         ]
         self.get_logger().info(f"identifies {aircraft.name!r}: {', '.join(aircraft.model_structure)}")
+        if not_taken := not_taken_in_words(aircraft):
+            self.get_logger().warning(not_taken)
 
     def cleanup(self) -> None:
         """Destroy what ``configure`` made."""
@@ -233,15 +237,23 @@ class Identifier(CarefulNode):
         if not session.samples:
             message.status += [source.waits("estimate"), source.waits("computation")]
             return
+        self._say_what_actuators_carry(session)
         due = due or session.now(session.silence)
         silence = session.silence if session.silence > stale_after else 0.0
         if silence:
             lag = self._lag
             self._publish(session, due)  # without data no estimate falls due, but users must see that they are old
             self._lag = lag
-        message.status.append(source.estimate(due.estimates, session.samples, self._lag))
+        taken = "commands" if session.commanded else "positions"
+        message.status.append(source.estimate(due.estimates, session.samples, self._lag, taken))
         work = {"update": session.update_times, "publication": self._publish_times}
         message.status.append(source.computation(work, self._lag, silence))
+
+    def _say_what_actuators_carry(self, session: Session) -> None:
+        """Say in the log what the actuators' messages are taken for, once, and again where that has changed."""
+        if session.carried != self._carried:
+            self._carried = session.carried
+            self.get_logger().info(session.carried or "Actuators carry positions.")
 
     def _warn(self, session: Session, monitors: Sequence[TopicMonitor], recent: Sequence[RecentTopic]) -> None:
         """Say in the log which inputs are silent, rejected or late."""

@@ -8,7 +8,7 @@ read that much later.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -59,13 +59,15 @@ def corrected(aircraft: Aircraft, record: FlightRecord, values: Mapping[Imperfec
     return replace(record, columns=columns)
 
 
-def read_later(time: Array, values: Array, delay: float) -> Array:
+def read_later(
+    time: Array, values: Array, delay: float, interpolator: Callable[..., Callable[[Array], Array]] = CubicSpline
+) -> Array:
     """The signal ``delay`` s later; what is missing remains so."""
     known = np.isfinite(values)
     if delay == 0.0 or np.count_nonzero(known) < 4:
         return values
     moments = np.clip(time + delay, time[known][0], time[known][-1])
-    return np.where(known, CubicSpline(time[known], values[known])(moments), np.nan)
+    return np.where(known, interpolator(time[known], values[known])(moments), np.nan)
 
 
 def _followed(aircraft: Aircraft, record: FlightRecord, name: str, servo: Mapping[str, float]) -> Array:

@@ -44,9 +44,10 @@ class ErrorSource:
 def sources(aircraft: Aircraft, *, vanes: bool = True) -> tuple[ErrorSource, ...]:
     """All imperfections of an aircraft but its servos; without those of the flow angles where no ``vanes`` are."""
     found = []
-    sizes = sizes_as_uncertainty(aircraft)
-    for key, tolerance in (dict.fromkeys(sizes, 0.0) | dict(aircraft.tolerances)).items():
-        source = _expected(aircraft, key, math.hypot(tolerance, sizes[key]) if key in sizes else float(tolerance))
+    tolerances, sizes = aircraft.tolerances, sizes_as_uncertainty(aircraft)
+    for key in dict.fromkeys((*tolerances, *sizes)):
+        sigma = float(tolerances.get(key, 0.0))
+        source = _expected(aircraft, key, math.hypot(sigma, sizes[key]) if key in sizes else sigma)
         seen = _change_of(source) is not None and (vanes or source.kind not in _FLOW)
         if source.sigma > 0.0 and math.isfinite(source.sigma) and seen:
             found.append(source)

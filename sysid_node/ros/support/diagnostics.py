@@ -65,13 +65,17 @@ class DiagnosticSource:
         """The status of ``estimate`` or ``computation`` before the first estimate."""
         return self._status(part, WARN, "no estimate yet: no sample with all inputs has come", {})
 
-    def estimate(self, estimates: Estimates, samples: int, lag: float = 0.0) -> DiagnosticStatus:
-        """How many derivatives are valid, why the others are not, and whether they come too late (``lag``, s)."""
+    def estimate(self, estimates: Estimates, samples: int, lag: float = 0.0, actuators: str = "") -> DiagnosticStatus:
+        """How many derivatives are valid, why the others are not, and whether they come too late (``lag``, s).
+
+        ``actuators``: what their messages are taken for.
+        """
         by_status: defaultdict[str, list[str]] = defaultdict(list)
         for derivative in estimates.derivatives.values():
             by_status[derivative.status].append(derivative.name)
         valid = sum(derivative.valid for derivative in estimates.derivatives.values())
         values: dict[str, object] = {"flight time (s)": estimates.time, "samples": samples}
+        values |= {"actuators carry": actuators} if actuators else {}
         values |= {reason: " ".join(names) for reason, names in by_status.items()}
         values |= {f"R^2 of {fit.coefficient}": fit.r_squared for fit in estimates.fits.values()}
         message = f"{valid} of {len(estimates.derivatives)} derivatives valid"
