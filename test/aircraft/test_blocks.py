@@ -64,6 +64,34 @@ def test_a_controls_scale_has_a_relative_tolerance():
     assert sigma["controls.elevator.scale"] == pytest.approx(0.5 * math.hypot(0.03, 0.04) / 0.5)
 
 
+def test_the_air_densitys_tolerance_is_in_kg_m3_and_counts_relative():
+    """0.024 of 1.2 kg/m^3 is 2 %."""
+    stated = GOOD.replace("air_density: 1.2", "air_density: {value: 1.2, tolerance: 0.024}")
+    assert stated != GOOD
+    aircraft = parse_aircraft(stated)
+    assert aircraft.reference.air_density == 1.2
+    assert aircraft.tolerances["air_density"] == pytest.approx(0.02)
+    assert parse_aircraft(GOOD).tolerances["air_density"] == 0.01
+    assert parse_aircraft(dump_aircraft(aircraft)) == aircraft
+    assert aircraft.tolerances.keys() == parse_aircraft(GOOD).tolerances.keys()
+
+
+def test_a_delay_may_stand_among_the_effects():
+    """Both mean the same: value and tolerance of the topic's stamps."""
+    other = GOOD.replace("delays: {imu: {value: 0.008, tolerance: 0.002}, actuators: 0.01}\n", "").replace(
+        "effects:\n", "effects:\n  imu_delay: {value: 0.008, tolerance: 0.002}\n  actuator_stamp_delay: 0.01\n"
+    )
+    one, two = parse_aircraft(GOOD), parse_aircraft(other)
+    assert one.stamp_delays == two.stamp_delays
+    assert {topic: delay.value for topic, delay in one.stamp_delays.items()} == {
+        "imu": 0.008,
+        "air_data": 0.0,
+        "actuators": 0.01,
+    }
+    for topic in one.delays:
+        assert one.tolerances[f"delays.{topic}"] == two.tolerances[f"delays.{topic}"], topic
+
+
 def test_what_is_not_stated_has_a_default():
     sigma = parse_aircraft(GOOD).tolerances
     assert sigma["inertia.Iyy"] == pytest.approx(0.05 * 0.15)
@@ -161,6 +189,7 @@ MISTAKES = [
         "tolerence: 1}",
         "mass.tolerence: unknown key; expected one of value, tolerance; did you mean",
     ),
+    ("air_density: 1.2", "air_density: {value: 12}", "reference.air_density.value: got 12, expected an air density"),
     ("bias: {gyro: 0.001}", "bias: {giro: 0.001}", "noise.bias.giro: unknown key"),
     ("delays: {imu:", "delays: {imus:", "delays.imus: unknown key; expected one of imu, air_data, actuators"),
     ("actuators: 0.01", "actuators: 10", "delays.actuators: got 10, expected a delay in s, at most 0.5 (is it in ms?)"),

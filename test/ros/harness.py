@@ -145,12 +145,14 @@ def start(name: str, *arguments: str) -> subprocess.Popen[str]:
 
 
 @contextmanager
-def ended(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[str]]:
-    """The process, interrupted at the end, which must be clean."""
+def ended(process: subprocess.Popen[str], said: list[str] | None = None) -> Iterator[subprocess.Popen[str]]:
+    """The process, interrupted at the end, which must be clean; what it wrote is added to ``said``."""
     try:
         yield process
         process.send_signal(signal.SIGINT)
         text, _ = process.communicate(timeout=10.0)
+        if said is not None:
+            said.append(text)
         assert process.returncode == 0, text
         assert "Traceback" not in text, text
     finally:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness import ROOT, START_NS, Probe, identifier, made_up_streams, start_identifier
+from harness import ROOT, START_NS, Probe, ended, identifier, made_up_streams, start_identifier
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
 from rcl_interfaces.srv import DescribeParameters, SetParameters
@@ -17,7 +17,9 @@ from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData, EstimateCorrelation
 
+from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import UncertainValue
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.streams import Arrival, Streams
@@ -71,13 +73,9 @@ def set_parameter(probe: Probe, name: str, value: ParameterValue) -> SetParamete
 
 def bits(estimates: Estimates) -> list[object]:
     """All numbers of an estimate so that equality is to the last bit, NaN included."""
-    derivatives = [
-        (d.name, d.value, d.standard_error, d.lower, d.upper, d.valid, d.status) for d in estimates.derivatives.values()
-    ]
-    fits = [
-        (f.coefficient, f.r_squared, f.residual_std, f.degrees_of_freedom, f.samples) for f in estimates.fits.values()
-    ]
-    return [[x.hex() if isinstance(x, float) else x for x in row] for row in derivatives + fits]
+    rows: list[tuple[object, ...]] = [*estimates.derivatives.values(), *estimates.fits.values()]
+    rows += estimates.servos.values()
+    return [[x.hex() if isinstance(x, float) else x for x in row] for row in rows]
 
 
 def test_a_bag_through_dds_gives_what_the_desk_gives_to_the_last_bit(probe: Probe, tmp_path: Path) -> None:
@@ -96,11 +94,18 @@ def test_a_bag_through_dds_gives_what_the_desk_gives_to_the_last_bit(probe: Prob
     for stamp, estimates in expected.items():
         assert bits(estimates_from_message(heard[stamp], START_NS)) == bits(estimates), f"at {estimates.time} s"
     assert any(d.valid for d in heard[max(expected)].derivatives), "the comparison must have something to compare"
+    assert {d.name for d in heard[max(expected)].servos} == {"elevator", "aileron", "rudder"}
+    assert any(d.systematic_error > 0.0 for d in heard[max(expected)].derivatives)
     assert {heard[stamp].header.frame_id for stamp in expected} == {"imu"}
-    gap = probe.gaps[-1]
+    gap = next(one for one in probe.gaps if stamp_ns(one.header.stamp) == max(expected))
     assert (gap.aircraft, gap.header.frame_id) == ("cdrw", "imu")
     assert set(gap.coefficients) == {"CL", "CD", "CY", "Cl", "Cm", "Cn"}
     assert all(value > 0.0 for value in (*gap.gap_std, *gap.noise_std, *gap.relative))
+    known = {d.name: d for d in heard[max(expected)].servos if d.valid}
+    assert known and gap.servos == list(known)
+    assert list(gap.servo_time) == [d.value for d in known.values()]
+    assert list(gap.servo_time_error) == [d.standard_error for d in known.values()]
+    assert all(map(math.isnan, gap.servo_time_in_file)), "the file says nothing of them"
 
 
 def test_forward_right_down_messages_give_the_same(probe: Probe, bag: Path, tmp_path: Path) -> None:
@@ -235,6 +240,32 @@ def test_wrong_joints_are_said_with_what_was_expected_and_what_came(probe: Probe
     assert "true_airspeed not measured" in text
     for publisher in (imu, air, joints):
         probe.node.destroy_publisher(publisher)
+
+
+def test_what_actuators_are_taken_for_is_said_once_and_again_when_it_changes(probe: Probe) -> None:
+    """Smooth joints are positions until they jump; the log and /diagnostics say both."""
+    flight = made_up_streams(6.0)
+    late = flight.actuators.arrival.stamp_ns > START_NS + 3 * 10**9
+    steps = 0.1 * ((np.arange(late.size) // 20) % 2)
+    flight.actuators.positions[late, :3] = steps[late, np.newaxis]
+    said: list[str] = []
+    with ended(start_identifier(), said):
+        probe.await_identifier()
+        probe.speak(flight, stop=2.9)
+        probe.until(lambda: probe.said("estimate", "actuators carry") == "positions")
+        probe.speak(flight, start=2.9)
+        probe.until(lambda: probe.said("estimate", "actuators carry") == "commands")
+    assert said[0].count("Actuators are taken as positions: no command jumps that a surface could not follow.") == 1
+    assert said[0].count("Actuators carry commands (told from the messages); of the servos the aircraft file says") == 1
+
+
+def test_effects_of_the_file_that_are_not_taken_into_account_are_said(probe: Probe, tmp_path: Path) -> None:
+    file, said = tmp_path / "stalling.yaml", list[str]()
+    effects = {"stall_separation": {"depth": UncertainValue(1.0)}}
+    file.write_text(dump_aircraft(replace(load_aircraft("cdrw"), effects=effects)))
+    with ended(start_identifier(f"aircraft:={file}"), said):
+        probe.await_identifier()
+    assert "the estimators do not correct for stall_separation" in said[0]
 
 
 def test_reset_and_save(probe: Probe, tmp_path: Path) -> None:

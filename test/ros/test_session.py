@@ -87,3 +87,19 @@ def test_silence_is_stale(session: Session) -> None:
     fly(session, made_up_streams(5.0), "iaj")
     assert {d.status for d in session.now(10.0).estimates.derivatives.values()} == {"stale input"}
     assert {d.status for d in session.now().estimates.derivatives.values()} != {"stale input"}
+
+
+def test_what_actuators_are_taken_for_follows_the_messages() -> None:
+    """Joints that jump are commands; a reset forgets it."""
+    session, flight = Session(load_aircraft("cdrw"), OnlineSettings(), 10.0), made_up_streams(2.0)
+    jumps = 0.1 * ((np.arange(200) // 20) % 2)
+    flight.actuators.positions[100:, :3] = jumps[100:, np.newaxis]
+    assert not session.commanded
+    assert session.carried.startswith("Actuators are taken as positions")
+    fly(session, flight, "iaj")
+    assert session.commanded
+    assert session.carried.startswith("Actuators carry commands (told from the messages)")
+    session.reset()
+    assert not session.commanded
+    stated = Session(load_aircraft("cdrw"), OnlineSettings(actuators="positions"), 10.0)
+    assert (stated.commanded, stated.carried) == (False, "")

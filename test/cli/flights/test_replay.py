@@ -84,7 +84,8 @@ def one_by_one(path, settings, rate):
 
 def bits(known):
     """Everything that estimates say, as text that shows every bit."""
-    return [known.time.hex(), *map(repr, (*known.derivatives.values(), *known.fits.values()))]
+    rows = (*known.derivatives.values(), *known.fits.values(), *known.servos.values())
+    return [known.time.hex(), *map(repr, rows)]
 
 
 @pytest.mark.parametrize("rate", [20.0, 3.0])
@@ -95,6 +96,27 @@ def test_a_replay_is_the_live_run_to_the_last_bit(bag, rate):
     assert done.stamps_ns.tolist() == [stamp for stamp, _ in live]
     for ours, (_, theirs) in zip(done.history, live, strict=True):
         assert bits(ours) == bits(theirs)
+
+
+def test_a_file_that_states_errors_and_delays_gives_the_same_live_and_in_a_replay(tmp_path, bag, flight):
+    """To the last bit, in pieces; and another than a silent file, in which all else is the same."""
+    effects = {
+        "vane_scale": {"alpha": UncertainValue(0.1, 0.01)},
+        "airspeed_scale": {"error": UncertainValue(0.05, 0.01)},
+        "imu_misalignment": {"pitch": UncertainValue(0.02, 0.001)},
+        "imu_lever_arm": {"z": UncertainValue(0.03, 0.001)},
+        "stall_separation": {"depth": UncertainValue(0.5)},
+    }
+    delays = {**AIRCRAFT.delays, "imu": UncertainValue(0.02, 0.001), "air_data": UncertainValue(0.05, 0.002)}
+    aircraft = replace(AIRCRAFT, effects=effects, delays=delays)
+    done = replay(load(bag, aircraft), LINES | {"publish_rate": 10.0}, at_once=701)
+    live = flown(Session(aircraft, SETTINGS, 10.0), flight, flight.actuators.positions)
+    assert [bits(one) for one in done.history] == [bits(one) for one in live]
+    assert len(live) > 50
+    silent = replay(load(bag, AIRCRAFT), LINES | {"publish_rate": 10.0})
+    assert bits(silent.final) != bits(done.final)
+    assert any("do not correct for stall_separation" in remark for remark in done.run.remarks)
+    assert not any("do not correct for" in remark for remark in silent.run.remarks)
 
 
 @pytest.mark.parametrize("at_once", [97, 1500])
@@ -108,6 +130,19 @@ def test_a_replay_in_pieces_is_the_whole_one(bag, tmp_path, at_once):
         assert (tmp_path / "pieces" / file).read_bytes() == (tmp_path / "whole" / file).read_bytes(), file
 
 
+def flown(session, streams, joints):
+    """The estimates of the node's session that hears the messages in their order."""
+    calls = [
+        *((session.imu, streams.imu, i, (tuple(v),)) for i, v in enumerate(streams.imu.values.tolist())),
+        *((session.air_data, streams.air_data, i, (tuple(v),)) for i, v in enumerate(streams.air_data.values.tolist())),
+        *((session.actuators, streams.actuators, i, (JOINTS, v)) for i, v in enumerate(joints.tolist())),
+    ]
+    live = []
+    for take, stream, i, values in sorted(calls, key=lambda call: call[1].arrival.order[call[2]]):
+        live += [due.estimates for due in take(int(stream.arrival.stamp_ns[i]), *values)]
+    return live
+
+
 @pytest.mark.parametrize("carried", ["auto", "commands"])
 def test_commands_are_followed_in_flight_as_in_a_replay(tmp_path, flight, carried):
     """Joints that jump are commands; from then on, servos of the file follow, and the estimator begins anew."""
@@ -118,16 +153,9 @@ def test_commands_are_followed_in_flight_as_in_a_replay(tmp_path, flight, carrie
     streams = replace(flight, actuators=replace(flight.actuators, positions=steps))
     write_streams(tmp_path / "steps", streams)
     done = replay(load(tmp_path / "steps", aircraft), LINES | {"actuators": carried, "publish_rate": 10.0}, at_once=701)
-    session = Session(aircraft, replace(SETTINGS, actuators=carried), 10.0)
-    calls = [
-        *((session.imu, streams.imu, i, (tuple(v),)) for i, v in enumerate(streams.imu.values.tolist())),
-        *((session.air_data, streams.air_data, i, (tuple(v),)) for i, v in enumerate(streams.air_data.values.tolist())),
-        *((session.actuators, streams.actuators, i, (JOINTS, v)) for i, v in enumerate(steps.tolist())),
-    ]
-    live = []
-    for take, stream, i, values in sorted(calls, key=lambda call: call[1].arrival.order[call[2]]):
-        live += [due.estimates for due in take(int(stream.arrival.stamp_ns[i]), *values)]
+    live = flown(Session(aircraft, replace(SETTINGS, actuators=carried), 10.0), streams, steps)
     assert [bits(one) for one in done.history] == [bits(one) for one in live]
+    assert set(done.final.servos) == {"elevator"}  # the model's only control
     assert done.run.settings["actuators_carry"] == "commands"
     assert (done.commands_from > done.samples.last[0][0]) == (carried == "auto")
     assert any("elevator 40 ms" in remark for remark in done.run.remarks)

@@ -266,3 +266,26 @@ def test_a_live_estimate_whose_errors_have_no_parts_is_not_called_exact():
     for estimate, stated in ((noise, False), (live, True)):
         run = RunResult("kestrel", "iv_rft", [Estimates(1.0, {"Cm_q": estimate}, {})])
         assert budget.context(run) == {"rows": [], "stated": stated}
+
+
+def test_rows_of_the_error_budget_name_the_largest_sources_and_what_reduces_the_first():
+    """Three sources at most, and none of less than 5 %; a derivative without known shares has no row."""
+    noise = DerivativeEstimate("Cm_q", -1.0, 0.1, -1.2, -0.8, True, "ok", 0.05, 0.087)
+    shares = {
+        "Cm_q": {"actuator_lag.elevator": 0.6, "statistical": 0.25, "delays.imu": 0.08, "mass": 0.06},
+        "Cm_de": {"controls.elevator.scale": 0.93, "geometry.S": 0.04},
+        "CD_0": {},
+    }
+    derivatives_found = {name: noise._replace(name=name) for name in shares}
+    final = Estimates(1.0, derivatives_found, {}, {}, shares)
+    rows = budget.context(RunResult("kestrel", "iv_rft", [final]))["rows"]
+    assert [(row.name, row.sources, row.advice) for row in rows] == [
+        (
+            "Cm_q",
+            "the elevator servo's time 60 %, noise and gusts 25 %, the delay of the IMU 8 %",
+            "measure it on the bench, or record positions",
+        ),
+        ("Cm_de", "the elevator's throw 93 %", "measure it with a throw gauge"),
+    ]
+    words = outline(RunResult("kestrel", "iv_rft", [final])).words
+    assert all(f"{row.name}{row.sources}{row.advice}" in words for row in rows)

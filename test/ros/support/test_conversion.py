@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from harness import START_NS
 from rclpy.serialization import deserialize_message, serialize_message
-from sysid_msgs.msg import DerivativeEstimates, EstimateCorrelation
+from sysid_msgs.msg import DerivativeEstimates, EstimateCorrelation, ModelGap
 
 from sysid_node.online.estimates.covariance import EstimateCovariance
+from sysid_node.online.estimates.model_gap import CoefficientGap
 from sysid_node.online.estimates.serialisation import EstimatesSerialiser
+from sysid_node.online.estimates.servo_gap import ServoGap
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.message_types import fields_of
@@ -36,6 +38,19 @@ def test_estimates_survive_to_the_last_bit() -> None:
     message = deserialize_message(raw, DerivativeEstimates)
     assert (message.header.frame_id, message.aircraft, message.method) == ("base_link", "cdrw", "sls_rft")
     assert conversion.estimates_from_message(message, START_NS) == estimates
+
+
+def test_gaps_of_servos_stand_in_the_message_of_the_gap() -> None:
+    gaps = [CoefficientGap("Cm", 0.02, 0.01, 0.3, "Cm_q", 2.5)]
+    servos = [ServoGap("elevator", 0.05, 0.004, 0.03), ServoGap("rudder", 0.06, 0.005, math.nan)]
+    raw = serialize_message(conversion.gap_message(gaps, servos, conversion.header(START_NS, "imu"), "cdrw"))
+    message = deserialize_message(raw, ModelGap)
+    assert list(message.servos) == ["elevator", "rudder"]
+    assert list(message.servo_time) == [0.05, 0.06]
+    assert list(message.servo_time_error) == [0.004, 0.005]
+    assert message.servo_time_in_file[0] == 0.03
+    assert math.isnan(message.servo_time_in_file[1])
+    assert list(message.gap_std) == [0.02]
 
 
 def test_correlations_survive_without_names_that_are_not_known() -> None:

@@ -110,8 +110,9 @@ def test_derivatives_are_grouped_by_what_is_wrong_with_them() -> None:
         },
         {"CL": FitQuality("CL", 0.9, 0.01, 20.0, 600)},
     )
-    status = SOURCE.estimate(estimates, 600)
+    status = SOURCE.estimate(estimates, 600, actuators="commands")
     assert (status.level, status.message) == (OK, "1 of 3 derivatives valid")
+    assert values(status)["actuators carry"] == "commands"
     assert values(status)["not excited"] == "Cl_p Cn_r"
     assert values(status)["R^2 of CL"] == "0.9"
 
