@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from made_flights import made_aircraft, made_streams
 
+from sysid_node.aircraft.model import UncertainValue
 from sysid_node.errors import InputError
 from sysid_node.flight import align as alignment
 from sysid_node.flight.actuation import Actuation
@@ -50,6 +51,18 @@ def test_interpolates_linearly_in_stamp_time():
         expected = np.interp(at - start, stream.arrival.stamp_ns - start, values)
         np.testing.assert_allclose(aligned.samples[:, column], expected, rtol=1e-9, atol=1e-12)
     np.testing.assert_array_equal(aligned.samples[:, :6], streams.imu.values[aligned.imu.kept[aligned.used]])
+
+
+def test_records_keep_stated_delays_and_errors_for_the_diagnosis_that_models_them():
+    """The estimators take them out (``batch.systematic.stated_errors``); twice would be once too often."""
+    delays = {topic: UncertainValue(delay) for topic, delay in (("imu", 0.03), ("air_data", 0.01), ("actuators", 0.1))}
+    effects = {"airspeed_scale": {"error": UncertainValue(0.1)}, "imu_bias": {"q": UncertainValue(0.1)}}
+    stating = dataclasses.replace(AIRCRAFT, delays=delays, effects=effects)
+    streams = made_streams(2.0)
+    for carried in ("positions", "commands"):
+        plain, other = (flight_record(aircraft, streams, 0.2, carried) for aircraft in (AIRCRAFT, stating))
+        for name, column in plain.columns.items():
+            np.testing.assert_array_equal(other[name], column, err_msg=name)
 
 
 def test_a_straight_line_comes_out_straight():

@@ -166,7 +166,10 @@ def servo_table(aircraft: Aircraft) -> TextTable:
 def tolerance_table(aircraft: Aircraft) -> TextTable:
     """Tolerances that the file states itself, and the default's size in words."""
     rows = []
-    for key, value in aircraft.stated_tolerances.items():
+    for stated, number_in_file in aircraft.stated_tolerances.items():
+        # that of the air density counts as a share
+        density = stated == "reference.air_density"
+        key, value = ("air_density", aircraft.tolerances["air_density"]) if density else (stated, number_in_file)
         if key not in aircraft.tolerances:
             continue
         default = default_of(key)
