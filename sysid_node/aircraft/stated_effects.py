@@ -59,6 +59,24 @@ def as_estimated(aircraft: Aircraft) -> Aircraft:
     )
 
 
+def stated_cg(aircraft: Aircraft) -> Vector3:
+    """Where the file's ``cg_shift`` has the centre of gravity, m from where all its places count from."""
+    values = aircraft.effects.get("cg_shift", {})
+    x, y, z = (values[axis].value if axis in values else 0.0 for axis in "xyz")
+    return x, y, z
+
+
+def with_places_from_cg(aircraft: Aircraft) -> Aircraft:
+    """The file with the places of the sensors from the stated CG; moments stay about the file's point."""
+    shift, sensors = stated_cg(aircraft), aircraft.sensors
+    if not any(shift):
+        return aircraft
+    by = [-x for x in shift]
+    return replace(
+        aircraft, sensors=replace(sensors, imu=_moved(sensors.imu, by), air_data=_moved(sensors.air_data, by))
+    )
+
+
 def _moved(place: Vector3, by: list[float]) -> Vector3:
     x, y, z = (a + b for a, b in zip(place, by, strict=True))
     return x, y, z

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.aircraft.stated_effects import as_estimated, not_taken_in_words
+from sysid_node.aircraft.stated_effects import as_estimated, not_taken_in_words, with_places_from_cg
 from sysid_node.batch.data_compatibility import check_sensors, corrected
 from sysid_node.batch.methods.constrained_least_squares import FORGETTING, WINDOW, constrained_least_squares
 from sysid_node.batch.methods.equation_error import equation_error
@@ -148,7 +148,7 @@ def _prepared(
         records, holdout = on_time(aircraft, records, posterior), on_time(aircraft, holdout, posterior)
     elif _uncertain(aircraft):
         remarks.append(_NOT_CONSIDERED)
-    return _PreparedFlights(aircraft, recorded, records, holdout, posterior, selections, remarks)
+    return _PreparedFlights(with_places_from_cg(aircraft), recorded, records, holdout, posterior, selections, remarks)
 
 
 def _fitted_with_systematic_errors(

@@ -15,10 +15,12 @@ import jax
 import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.stated_effects import stated_cg
 from sysid_node.batch.models.aerodynamics import coefficient_function, derivative_parameters
 from sysid_node.batch.models.gusts import DRIVEN, air_relative, gust_parameters, gust_rates, gust_states
 from sysid_node.batch.models.kinematics import at_probe, attitude_rates, flow_rates
 from sysid_node.batch.models.model import Scalars, StateSpaceModel
+from sysid_node.dynamics.vector import Vector
 from sysid_node.errors import InputError
 
 #: States that may be integrated, each with the coefficient without which it cannot be; None: kinematics alone.
@@ -196,7 +198,7 @@ class _Motion:
 
     def _angular(self, s: Signals, air: Signals, c: Mapping[str, jax.Array]) -> dict[str, jax.Array]:
         """Angular accelerations of the axes whose moments are modelled."""
-        a, inertia = self.aircraft, self.aircraft.inertia
+        a, inertia, about_cg = self.aircraft, self.aircraft.inertia, self._moment_of_shift(air, c)
         pressure = 0.5 * air["rho"] * air["V"] ** 2 * a.geometry.S
         Ixx, Iyy, Izz, Ixz = inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz
         rates: dict[str, jax.Array] = {}
@@ -204,14 +206,22 @@ class _Motion:
             pitching = pressure * a.geometry.cbar * c["Cm"] + s["thrust"] * (a.throttle.arm if a.throttle else 0.0)
             if not math.isnan(Ixx + Izz):  # not known: a longitudinal flight, in which they are of no account
                 pitching += (Izz - Ixx) * s["p"] * s["r"] + Ixz * (s["r"] ** 2 - s["p"] ** 2)
-            rates["q"] = pitching / Iyy
+            rates["q"] = (pitching - about_cg.y) / Iyy
         if "Cl" in c and "Cn" in c:
             rolling = pressure * a.geometry.b * c["Cl"] + Ixz * s["p"] * s["q"] + (Iyy - Izz) * s["q"] * s["r"]
             yawing = pressure * a.geometry.b * c["Cn"] - Ixz * s["q"] * s["r"] + (Ixx - Iyy) * s["p"] * s["q"]
+            rolling, yawing = rolling - about_cg.x, yawing - about_cg.z
             determinant = Ixx * Izz - Ixz**2
             rates["p"] = (Izz * rolling + Ixz * yawing) / determinant
             rates["r"] = (Ixz * rolling + Ixx * yawing) / determinant
         return rates
+
+    def _moment_of_shift(self, air: Signals, c: Mapping[str, jax.Array]) -> Vector:
+        """What the forces add to the moments about the file's point where the CG is stated to be elsewhere, N m."""
+        shift = stated_cg(self.aircraft)
+        if not any(shift):
+            return Vector(0.0, 0.0, 0.0)
+        return Vector(*shift).cross(self._specific_force(air, c)).times(self.aircraft.mass)
 
     def _at_imu(
         self, s: Signals, force: tuple[jax.Array, jax.Array, jax.Array], angular: Mapping[str, jax.Array]

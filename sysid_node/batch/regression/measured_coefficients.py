@@ -17,6 +17,7 @@ from functools import lru_cache
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft, LookupTable
+from sysid_node.aircraft.stated_effects import stated_cg
 from sysid_node.batch.regression.filtering import differentiate
 from sysid_node.dynamics import scalar
 from sysid_node.dynamics.airflow import speed_of
@@ -222,6 +223,7 @@ def _coefficients(aircraft: Aircraft, s: Mapping[str, Array]) -> tuple[dict[str,
     elif "CD" in aircraft.model_structure:
         remarks.append("thrust was not measured: drag cannot be told from it, and CD is left out")
     moments, unknown = _moments(aircraft, s, force, thrust * arm)
+    moments = _about_file(aircraft, s, force, moments)
     return c | moments, remarks + [f"{name} left out: {reason}" for name, reason in unknown.items()]
 
 
@@ -246,6 +248,19 @@ def _moments(
         if math.isnan(moment) and name in aircraft.model_structure
     }
     return {name: value for name, value in moments.items() if not math.isnan(about[name])}, unknown
+
+
+def _about_file(
+    aircraft: Aircraft, s: Mapping[str, Array], force: Array, moments: dict[str, Array]
+) -> dict[str, Array]:
+    """Moments about the file's point, where the file states that the CG is elsewhere: shift x force is added."""
+    shift = stated_cg(aircraft)
+    if not any(shift):
+        return moments
+    more = Vector(*shift).cross(Vector(s["ax"], s["ay"], s["az"])).times(aircraft.mass)
+    b, cbar = aircraft.geometry.b, aircraft.geometry.cbar
+    terms = {"Cl": more.x / (force * b), "Cm": more.y / (force * cbar), "Cn": more.z / (force * b)}
+    return {name: value + terms[name] for name, value in moments.items()}
 
 
 def _tables(aircraft: Aircraft) -> list[LookupTable]:

@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.stated_effects import stated_cg
 from sysid_node.batch.results.batch_fit import BatchFit, SystematicPart
 from sysid_node.batch.results.estimate import NORMAL_95, ParameterEstimate, confidence_interval
 from sysid_node.batch.systematic.clocks import LATE_COLUMNS, corrected, is_timing
@@ -48,7 +49,7 @@ def with_systematic_errors(
     names = tuple(fit.estimates)
     G = _jacobian(aircraft, records, names, posterior, response)
     others = np.array([not is_timing(one) for one in posterior.imperfections])
-    moved = (posterior.mean * others) @ G
+    moved = ((posterior.mean - _taken_into_account(aircraft, posterior)) * others) @ G
     systematic = G.T @ posterior.covariance @ G
     errors = np.sqrt(np.maximum(np.diag(systematic), 0.0))
     estimates = {
@@ -71,6 +72,12 @@ def with_systematic_errors(
         covariance=fit.covariance + systematic,
         systematic=SystematicPart(servos(posterior), budget),
     )
+
+
+def _taken_into_account(aircraft: Aircraft, posterior: FlightPosterior) -> Array:
+    """(K,) values that the methods have from the file already: where it states the CG."""
+    shift = {f"cg_shift.{axis}": value for axis, value in zip("xyz", stated_cg(aircraft), strict=True)}
+    return np.array([shift.get(one.key, 0.0) for one in posterior.imperfections])
 
 
 def _compared(estimate: ParameterEstimate, online: tuple[float, float] | None) -> ParameterEstimate:

@@ -3,14 +3,20 @@
 Truth: the simulator's derivatives. What the file states is drawn about the truth within its tolerances.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft, UncertainValue
+from sysid_node.batch.identify import identify
+from sysid_node.batch.results.estimate import ParameterEstimate
+from sysid_node.batch.settings import BatchSettings
 from sysid_node.excite.spec import parse_manoeuvre
+from sysid_node.flight.align import flight_record
 from sysid_node.flight.streams import Streams
 from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.replay import run
@@ -20,6 +26,7 @@ from sysid_node.sim import Simulator
 from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
 
+Rows = Sequence[tuple[DerivativeEstimate | ParameterEstimate, float]]
 CDRW = load_aircraft("cdrw")
 #: As flown, with the tolerance of each in the file.
 EFFECTS = {
@@ -63,12 +70,23 @@ def found(aircraft: Aircraft) -> list[tuple[DerivativeEstimate, float]]:
     return [(d, truth[name]) for name, d in final.derivatives.items() if d.valid]
 
 
-def held(rows: list[tuple[DerivativeEstimate, float]]) -> float:
+def regressed(aircraft: Aircraft) -> list[tuple[ParameterEstimate, float]]:
+    """The same by equation error, which has the samples aligned already."""
+    streams, truth = flight()
+    record = flight_record(aircraft, streams, 0.2, "positions")
+    estimates = identify("equation_error", aircraft, [record], BatchSettings(actuators="positions")).fit.estimates
+    return [(e, truth[name]) for name, e in estimates.items() if e.valid]
+
+
+def held(rows: Rows) -> float:
     return float(np.mean([d.lower <= truth <= d.upper for d, truth in rows]))
 
 
-def test_intervals_hold_with_a_file_that_states_what_is_off_and_not_with_a_silent_one() -> None:
-    silent, stated = found(CDRW), found(stating(1))
+@pytest.mark.parametrize("estimated", [found, regressed])
+def test_intervals_hold_with_a_file_that_states_what_is_off_and_not_with_a_silent_one(
+    estimated: Callable[[Aircraft], Rows],
+) -> None:
+    silent, stated = estimated(CDRW), estimated(stating(1))
     assert held(silent) < 0.8
     assert held(stated) > 0.94
     assert max(abs(d.value - truth) / d.standard_error for d, truth in stated) < 3.0
