@@ -7,7 +7,13 @@ import pytest
 from sysid_node.aircraft.effect_names import EFFECT_NAMES
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft, UncertainValue
-from sysid_node.aircraft.stated_effects import as_estimated, not_taken_in_words, sizes_as_uncertainty
+from sysid_node.aircraft.stated_effects import (
+    as_estimated,
+    not_taken_in_words,
+    sizes_as_uncertainty,
+    stated_cg,
+    with_places_from_cg,
+)
 
 CDRW = load_aircraft("cdrw")
 
@@ -45,6 +51,16 @@ def test_numbers_that_effects_change_are_those_of_the_simulator() -> None:
     assert sigma["sensors.imu.z"] == CDRW.tolerances["sensors.imu.z"]
     assert as_estimated(found) is found
     assert as_estimated(CDRW) is CDRW
+
+
+def test_places_count_from_the_stated_cg() -> None:
+    """A CG further forward makes the arms to sensors before it shorter."""
+    file = stating(cg_shift={"x": UncertainValue(0.03), "z": UncertainValue(-0.01)})
+    assert stated_cg(file) == (0.03, 0.0, -0.01)
+    found = with_places_from_cg(file)
+    assert found.sensors.imu == pytest.approx((0.02, 0.0, 0.0))
+    assert found.sensors.air_data == pytest.approx((0.52, 0.0, 0.01))
+    assert with_places_from_cg(CDRW) is CDRW
 
 
 def test_sizes_that_are_not_corrected_for_count_as_uncertainty() -> None:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from made_flight import KESTREL, MODEL, clean, trim
 
+from sysid_node.aircraft.model import UncertainValue
+from sysid_node.aircraft.stated_effects import with_places_from_cg
 from sysid_node.batch.likelihood import rollout
 from sysid_node.batch.models.manoeuvres import manoeuvre_data, with_forces_at_cg
 from sysid_node.batch.models.rigid_body import STATES, rigid_body
@@ -14,10 +16,16 @@ from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import Simulator
 
+SHIFT = {"cg_shift": {"x": UncertainValue(0.02), "y": UncertainValue(-0.005), "z": UncertainValue(0.03)}}
 
-def test_it_flies_as_the_simulator_does():
+
+@pytest.mark.parametrize("effects", [{}, SHIFT])
+def test_it_flies_as_the_simulator_does(effects):
+    """Also where the file states that the CG is elsewhere."""
+    file = dataclasses.replace(KESTREL, effects=effects)
+    model = rigid_body(with_places_from_cg(file), MODEL.states, MODEL.outputs)
     record = clean(seconds=6.0)
-    simulator = Simulator(KESTREL, rate=100.0)
+    simulator = Simulator(file, rate=100.0)
     commands = np.column_stack([record[symbol] for symbol in KESTREL.control_symbols] + [record["thrust"]])
     alpha, airspeed = trim()[0], KESTREL.reference.airspeed
     start = simulator.initial(airspeed, alpha, 0.0, (0.0, alpha, 0.0))
@@ -27,7 +35,7 @@ def test_it_flies_as_the_simulator_does():
     density = np.asarray(air_density(-np.asarray(flown.states[:, 2]), np))
     inputs = dataclasses.replace(record, columns={**record.columns, **outputs, "rho": density})
     start_here = {"V": airspeed, "alpha": alpha, "theta": alpha, **dict.fromkeys(("beta", "p", "q", "r", "phi"), 0.0)}
-    mine = rollout.outputs(MODEL, manoeuvre_data(MODEL, inputs, start_here), MODEL.start)
+    mine = rollout.outputs(model, manoeuvre_data(model, inputs, start_here), model.start)
     for name, values in zip(MODEL.outputs, mine.T, strict=True):
         assert np.abs(values - outputs[name]).max() < 1e-4 * np.ptp(outputs[name]), name
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_flight import KESTREL, clean, flight
 
-from sysid_node.aircraft.model import LookupTable
+from sysid_node.aircraft.model import LookupTable, UncertainValue
 from sysid_node.batch.regression.measured_coefficients import measured_coefficients
 from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
@@ -16,6 +16,21 @@ def test_forces_and_air_data_are_moved_to_the_cg():
     moved = measured_coefficients(KESTREL, clean()).coefficients["CL"]
     ignored = dataclasses.replace(KESTREL, sensors=type(KESTREL.sensors)())
     assert np.abs(measured_coefficients(ignored, clean()).coefficients["CL"] - moved).max() > 0.02
+
+
+def test_moments_are_about_the_files_point_where_the_cg_is_elsewhere():
+    """By hand: a force through the CG, which lies (x, y, z) from that point, adds (x, y, z) x force to the moments."""
+    x, y, z = shift = (0.03, -0.01, 0.02)
+    effects = {"cg_shift": {axis: UncertainValue(by) for axis, by in zip("xyz", shift, strict=True)}}
+    at_cg = dataclasses.replace(KESTREL, sensors=type(KESTREL.sensors)())
+    plain = measured_coefficients(at_cg, clean()).coefficients
+    found = measured_coefficients(dataclasses.replace(at_cg, effects=effects), clean()).coefficients
+    record, g, m = clean(), KESTREL.geometry, KESTREL.mass
+    ax, ay, az = (m * record[name] for name in ("ax", "ay", "az"))
+    area = 0.5 * record["rho"] * record["V"] ** 2 * g.S
+    added = {"Cl": (y * az - z * ay) / g.b, "Cm": (z * ax - x * az) / g.cbar, "Cn": (x * ay - y * ax) / g.b}
+    for name, values in plain.items():
+        np.testing.assert_allclose(found[name] - values, added.get(name, 0.0) / area, atol=1e-12)
 
 
 def test_the_ground_is_left_out_and_a_record_of_nothing_else_refused():
