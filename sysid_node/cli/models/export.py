@@ -16,13 +16,12 @@ from sysid_node.errors import InputError
 from sysid_node.report.files.outputs.output_file import check_file, write_file
 
 if TYPE_CHECKING:
+    from sysid_node.sim.export.exported import Exported
+
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
 #: What stands near the beginning of every file that this command writes, by which a later run knows it.
 MARK = "sysid export"
-
-#: Derivatives of the drag that a parabola of the lift holds.
-_OF_PARABOLA = ("CD_0", "CD_k")
 
 FORMATS = ("jsbsim", "gazebo", "rosflight")
 
@@ -59,12 +58,14 @@ def run(args: argparse.Namespace) -> None:
     left: list[str] = []
     if summary:
         aircraft, left = with_estimates(aircraft, summary["derivatives"])
-    text, left_out = _write(args.format, aircraft, args.effect)
-    write_file(args.out, text)
+    exported = _write(args.format, aircraft, args.effect)
+    write_file(args.out, exported.text)
     if not args.quiet:
         kept = f"; not valid, kept as in the aircraft file: {', '.join(left)}" if left else ""
-        lost = f"; {args.format} cannot hold, left out: {', '.join(left_out)}" if left_out else ""
+        lost = f"; what {args.format} does not hold:" if exported.left_out else ""
         print(f"{args.out}: {aircraft.name} for {args.format}{kept}{lost}")
+        for line in exported.left_out:
+            print(f"- {line}")
 
 
 def with_estimates(aircraft: Aircraft, estimates: Mapping[str, Mapping[str, Any]]) -> tuple[Aircraft, list[str]]:
@@ -113,29 +114,19 @@ def _summary(estimate: str) -> dict[str, Any] | None:
     raise InputError(f"{path}: not the summary.json of a run (it needs aircraft and derivatives)")
 
 
-def _over_throttle(aircraft: Aircraft) -> bool:
-    return any("throttle" in table.over for table in aircraft.tables)
-
-
-def _write(form: str, aircraft: Aircraft, specs: list[str]) -> tuple[str, list[str]]:
-    """The model, and what of the aircraft file its format cannot hold. Raises InputError for an effect asked for."""
-    from sysid_node.sim.export.gazebo import gazebo_plugin  # noqa: PLC0415  # JAX takes its time
-    from sysid_node.sim.export.jsbsim import EFFECTS, jsbsim_model  # noqa: PLC0415
+def _write(form: str, aircraft: Aircraft, specs: list[str]) -> Exported:
+    """The model. Raises InputError for an effect asked for that its format cannot hold."""
+    from sysid_node.sim.export.gazebo.model import gazebo_model  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim.export.jsbsim import export_jsbsim  # noqa: PLC0415
     from sysid_node.sim.export.rosflight import rosflight_parameters  # noqa: PLC0415
     from sysid_node.sim.model import parameters  # noqa: PLC0415
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
 
     effects = Simulator(aircraft).effects(specs) if specs or aircraft.effect_values() else {}
-    expressible = EFFECTS if form == "jsbsim" else ()
-    requested = parameters.parse(specs)
-    left_out = [name for name in effects if name not in expressible and name not in requested]
-    if form != "jsbsim" and aircraft.tables:
-        left_out.append(f"{len(aircraft.tables)} table{'s' * (len(aircraft.tables) > 1)}")
-    if form == "jsbsim" and effects.get("actuator_lag", {}).get("damping"):
-        left_out.append("damping of actuator_lag (its actuators are of first order)")
-    if form == "jsbsim" and effects.get("command_delay", {}).get("throttle") and _over_throttle(aircraft):
-        left_out.append("the delay of the throttle, in tables over it (the thrust has it)")
-    if form != "jsbsim" and any(name.startswith("CD_") and name not in _OF_PARABOLA for name in aircraft.derivatives):
-        left_out.append("slopes of CD (its drag is a parabola of the lift, right at the reference)")
-    write = {"jsbsim": jsbsim_model, "gazebo": gazebo_plugin, "rosflight": rosflight_parameters}[form]
-    return write(aircraft, {name: values for name, values in effects.items() if name not in left_out}), left_out
+    write = {"jsbsim": export_jsbsim, "gazebo": gazebo_model, "rosflight": rosflight_parameters}[form]
+    exported = write(aircraft, effects)
+    for name in parameters.parse(specs):
+        why = next((line for line in exported.left_out if line.startswith(f"{name}:")), None)
+        if why is not None and name not in exported.held:
+            raise InputError(f"effect {name!r} cannot be exported to {form}: {why.partition(': ')[2]}")
+    return exported

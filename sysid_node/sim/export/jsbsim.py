@@ -16,6 +16,8 @@ from sysid_node.aircraft.model import Aircraft, LookupTable
 from sysid_node.aircraft.names import COEFFICIENTS, split_derivative
 from sysid_node.errors import InputError
 from sysid_node.sim.export.cells import finite, plain
+from sysid_node.sim.export.exported import Exported
+from sysid_node.sim.export.losses import not_held
 
 #: Effects that JSBSim's own blocks can express.
 EFFECTS = (
@@ -62,6 +64,21 @@ def jsbsim_model(aircraft: Aircraft, effects: Effects | None = None) -> str:
     _aerodynamics(root, aircraft, effects.get("derivative_error", {}))
     indent(root, "  ")
     return '<?xml version="1.0"?>\n' + tostring(root, encoding="unicode") + "\n"
+
+
+_WHY = {
+    "ground_effect": "the aerodynamics of the model hold none",
+    "structural_mode": "the model is rigid",
+}
+
+
+def export_jsbsim(aircraft: Aircraft, effects: Effects | None = None) -> Exported:
+    """The model, and what it does not hold. Raises InputError for an unknown moment of inertia."""
+    held = {name: values for name, values in (effects or {}).items() if name in EFFECTS}
+    lines = not_held(effects or {}, EFFECTS, _WHY)
+    if held.get("actuator_lag", {}).get("damping"):
+        lines.append("actuator_lag: its damping (actuators are of first order)")
+    return Exported(jsbsim_model(aircraft, held), tuple(lines), frozenset(EFFECTS))
 
 
 def _text(parent: Element, tag: str, text: str | float, **attributes: str) -> Element:

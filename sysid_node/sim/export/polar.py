@@ -9,22 +9,34 @@ from sysid_node.sim.model.layout import reference_flight
 
 
 class ParabolicPolar(NamedTuple):
-    """CD = zero + factor CL^2, equal to the file's in value and slope at the reference condition."""
+    """CD = zero + factor CL^2, equal to the file's in value and slope at the reference condition.
+
+    ``own`` is the part of the factor that the file itself has (``CD_k``), ``fitted`` the part that stands for a slope
+    with the angle of attack. Of the latter, lift by other things than the angle of attack has its share as well.
+    """
 
     zero: float
-    factor: float
+    own: float
+    fitted: float
     lift: float  # CL at the reference condition
     alpha: float  # rad, of that flight
 
+    @property
+    def factor(self) -> float:
+        """CD per CL^2."""
+        return self.own + self.fitted
+
 
 def polar_of(aircraft: Aircraft) -> ParabolicPolar:
-    """The parabola; its factor is 0 where the file's drag does not grow with lift."""
+    """The parabola of an aircraft's derivatives; it has no fitted part where the drag does not grow with lift."""
     lift, alpha = reference_flight(aircraft)
     value = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
-    get = value.get
-    if "CD_alpha" not in value:
-        return ParabolicPolar(get("CD_0", 0.0), get("CD_k", 0.0), lift, alpha)
-    slope = get("CL_alpha", 0.0) * lift
-    factor = max(value["CD_alpha"] / (2.0 * slope), 0.0) if slope > 0.0 else 0.0
-    drag = get("CD_0", 0.0) + value["CD_alpha"] * alpha + get("CD_k", 0.0) * lift**2
-    return ParabolicPolar(drag - factor * lift**2, factor, lift, alpha)
+    own, slope, offset = (value.get(f"CD_{name}", 0.0) for name in ("k", "alpha", "0"))
+    return parabola(lift, alpha, offset + slope * alpha + own * lift**2, slope, value.get("CL_alpha", 0.0), own)
+
+
+def parabola(lift: float, alpha: float, drag: float, slope: float, lift_slope: float, own: float) -> ParabolicPolar:
+    """The parabola through a flight's CL and CD; ``slope`` is that of CD with alpha beside what ``own`` gives."""
+    share = 2.0 * lift * lift_slope
+    fitted = max(slope / share, -own) if slope and share > 0.0 else 0.0
+    return ParabolicPolar(drag - (own + fitted) * lift**2, own, fitted, lift, alpha)

@@ -20,12 +20,19 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Control, Geometry, Inertia
 from sysid_node.errors import InputError
 from sysid_node.sim.importing.imported import Imported
-from sysid_node.sim.importing.plant import Plant, PlantEngine, PlantStates, aircraft_of
+from sysid_node.sim.importing.plant import LoadFunction, Plant, PlantEngine, PlantStates, aircraft_of
 
 Array = NDArray[np.float64]
 
 #: ROSflight's letter of each control, and the sign of the aircraft file's: there, aileron rolls left.
 _CONTROLS = {"elevator": ("de", "e", 1.0), "aileron": ("da", "a", -1.0), "rudder": ("dr", "r", 1.0)}
+
+#: Efficiency of the induced drag: a constant of rosflight_sim, which does not use wing_epsilon.
+EFFICIENCY = 0.9
+
+#: Half of rosflight_sim's servo_refresh_rate, s: a servo_tau of it lets surfaces follow within one step.
+NO_SERVO_LAG = 0.0015
+
 _LARGEST = 1e100  # of a number in a model, in any unit
 _ANGLE = "max_{}_deflection_angle"
 
@@ -40,9 +47,8 @@ _COMMENT = re.compile(r"^#\s*(mass|Jx|Jy|Jz|Jxz)\s*:\s*([-+0-9.eE]+)\s*$", re.IG
 
 def read_rosflight(path: Path, airspeed: float | None = None) -> Imported:
     """The aircraft of a parameter file, expanded about level flight at ``airspeed`` (m/s). Raises InputError."""
-    parameters, comments = _read(path)
-    get = _Getter(parameters, comments, path)
-    new = any(_ANGLE.format(name) in parameters for name in _CONTROLS)
+    parameters, get = _getter(path)
+    new = _in_radians(parameters)
     angles = {name: math.radians(get.or_else(_ANGLE.format(name), 40.0)) if new else 1.0 for name in _CONTROLS}
     controls = {
         name: Control(name, symbol, {name: sign}, limit=min(angles[name], math.pi / 2))
@@ -51,6 +57,7 @@ def read_rosflight(path: Path, airspeed: float | None = None) -> Imported:
     powered = all(name in parameters for name in _PROPELLER)
     model = _Model(get, blend=not new, powered=powered)
     lag = get.or_else("servo_tau", 0.0)
+    lag = lag if lag > NO_SERVO_LAG else 0.0
     effects = {"actuator_lag": dict.fromkeys(("elevator", "aileron"), lag)} if lag else {}
     plant = Plant(
         name=path.stem,
@@ -72,6 +79,22 @@ def read_rosflight(path: Path, airspeed: float | None = None) -> Imported:
             "C_D_p is zero: rosflight_sim takes the parasitic drag from it (not from C_D_O), so there is none."
         )
     return Imported(aircraft, tuple(notes))
+
+
+def rosflight_loads(path: Path) -> LoadFunction:
+    """The airframe's loads (N, 6) of a parameter file; deflections in its own unit. Raises InputError."""
+    parameters, get = _getter(path)
+    return _Model(get, blend=not _in_radians(parameters), powered=False).air
+
+
+def _getter(path: Path) -> tuple[dict[str, Any], _Getter]:
+    parameters, comments = _read(path)
+    return parameters, _Getter(parameters, comments, path)
+
+
+def _in_radians(parameters: Mapping[str, Any]) -> bool:
+    """Whether deflections are in rad, and the lift is linear."""
+    return any(_ANGLE.format(name) in parameters for name in _CONTROLS)
 
 
 def _notes(new: bool, lag: float, throttle: float | None, airspeed: float) -> list[str]:
@@ -149,7 +172,7 @@ class _Model:
         deflection = {letter: sign * s.controls[symbol] for symbol, letter, sign in _CONTROLS.values()}
         attached = c["L_O"] + c["L_alpha"] * s.alpha
         lift = self._blended(s.alpha, attached) + c["L_q"] * q + c["L_delta_e"] * deflection["e"]
-        induced = attached**2 / (3.14159 * 0.9 * geometry.b**2 / geometry.S)  # rosflight_sim's own pi and efficiency
+        induced = attached**2 / (3.14159 * EFFICIENCY * geometry.b**2 / geometry.S)  # rosflight_sim's own pi
         drag = c["D_p"] + induced + c["D_q"] * q + c["D_delta_e"] * deflection["e"]
         lateral = [
             c[f"{n}_O"] + c[f"{n}_beta"] * s.beta + c[f"{n}_p"] * p + c[f"{n}_r"] * r
@@ -167,8 +190,7 @@ class _Model:
         """Lift of the wing: blended to a flat plate's at stall (Beard & McLain, eqs. 4.9 and 4.10)."""
         if not self._blend:
             return attached
-        below, above = np.exp(-self._M * (alpha - self._alpha0)), np.exp(self._M * (alpha + self._alpha0))
-        sigma = (1.0 + below + above) / ((1.0 + below) * (1.0 + above))
+        sigma = blending(alpha, self._M, self._alpha0)
         plate = 2.0 * np.where(alpha >= 0.0, 1.0, -1.0) * np.sin(alpha) ** 2 * np.cos(alpha)
         return np.asarray((1.0 - sigma) * attached + sigma * plate)
 
@@ -188,6 +210,12 @@ class _Model:
         )
         zero = np.zeros_like(speed)
         return np.column_stack([thrust, zero, zero, -torque, zero, zero])
+
+
+def blending(alpha: Array, M: float, alpha0: float) -> Array:
+    """0 in attached flow, 1 beyond the angle of stall (rad): Beard & McLain, eq. 4.10."""
+    below, above = np.exp(-M * (alpha - alpha0)), np.exp(M * (alpha + alpha0))
+    return np.asarray((1.0 + below + above) / ((1.0 + below) * (1.0 + above)))
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, float]]:

@@ -7,13 +7,16 @@ from xml.etree.ElementTree import fromstring, parse
 import pytest
 import yaml
 
+from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Derivative
+from sysid_node.aircraft.model import NO_DELAYS, Derivative, UncertainValue
 from sysid_node.cli.main import main
 from sysid_node.errors import InputError
-from sysid_node.sim.export.gazebo import gazebo_plugin
-from sysid_node.sim.export.jsbsim import jsbsim_model
+from sysid_node.sim.export.gazebo.model import gazebo_model
+from sysid_node.sim.export.jsbsim import export_jsbsim
 from sysid_node.sim.export.rosflight import rosflight_parameters
+from sysid_node.sim.importing.gazebo.read import read_gazebo
+from sysid_node.sim.importing.rosflight import read_rosflight
 
 SUMMARY = {
     "aircraft": "cdrw",
@@ -53,14 +56,34 @@ def test_effects_go_into_jsbsim(run):
     assert [float(lag.text) for lag in parse(run / "m.xml").iter("lag")] == [20.0] * 3
 
 
+@pytest.mark.parametrize("form", ["gazebo", "rosflight"])
+def test_a_corrected_file_is_exported_with_its_effects(tmp_path, capsys, form):
+    """What a diagnosis wrote: the slow servo is in the model, and what the format has not is said, a line each."""
+    effects = {"actuator_lag": dict.fromkeys(("elevator", "aileron"), UncertainValue(0.1)),
+               "actuator_backlash": {"rudder": UncertainValue(0.02)}}  # fmt: skip
+    delays = {**NO_DELAYS, "imu": UncertainValue(0.02)}
+    corrected = replace(load_aircraft("kestrel"), effects=effects, delays=delays)
+    (tmp_path / "corrected.yaml").write_text(dump_aircraft(corrected))
+    out = tmp_path / "model"
+    assert main(["export", str(tmp_path / "corrected.yaml"), "--format", form, "--out", str(out)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"{out}: kestrel for {form}; what {form} does not hold:"
+    assert [line for line in lines if line.startswith("- actuator_backlash: ")]
+    assert "- imu_delay: it lies in the flight's instruments, not in the simulator" in lines
+    assert not [line for line in lines if line.startswith("- actuator_lag")]
+    found = {"gazebo": read_gazebo, "rosflight": read_rosflight}[form](out, 16.0).aircraft
+    lags = found.effects["actuator_lag"]
+    assert (lags["elevator"].value, lags["aileron"].value) == pytest.approx((0.1, 0.1))
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (["nobody", "--format", "jsbsim"], "nobody"),
         (["missing/summary.json", "--format", "jsbsim"], "not found"),
         (
-            ["{run}/summary.json", "--format", "gazebo", "--effect", "actuator_lag:time_constant=0.1"],
-            "cannot be exported",
+            ["{run}/summary.json", "--format", "gazebo", "--effect", "actuator_backlash:elevator=0.02"],
+            "'actuator_backlash' cannot be exported to gazebo: Gazebo's joint controllers have no free play",
         ),
         (["{run}/broken.json", "--format", "gazebo"], "not the summary.json of a run"),
         (["cdrw", "--format", "jsbsim", "--out", "{run}/none/model.xml"], "cannot be written"),
@@ -109,7 +132,7 @@ def test_a_name_with_a_newline_and_marks_injects_nothing(form):
     """The name of the aircraft file is text of the user's: in YAML a second line of it would be a key."""
     name = 'a\n/**:\n  ros__parameters:\n    mass: 99.0\n"><evil/>\x00'
     aircraft = replace(load_aircraft("cdrw"), name=name, source=name)
-    text = {"jsbsim": jsbsim_model, "gazebo": gazebo_plugin, "rosflight": rosflight_parameters}[form](aircraft)
+    text = {"jsbsim": export_jsbsim, "gazebo": gazebo_model, "rosflight": rosflight_parameters}[form](aircraft).text
     if form == "rosflight":
         assert yaml.safe_load(text)["/**"]["ros__parameters"]["mass"] == load_aircraft("cdrw").mass
     else:
@@ -117,7 +140,7 @@ def test_a_name_with_a_newline_and_marks_injects_nothing(form):
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
-@pytest.mark.parametrize("writer", [jsbsim_model, gazebo_plugin, rosflight_parameters])
+@pytest.mark.parametrize("writer", [export_jsbsim, gazebo_model, rosflight_parameters])
 def test_a_value_that_is_not_finite_is_refused(writer, value):
     aircraft = load_aircraft("cdrw")
     derivatives = {**aircraft.derivatives, "CL_q": Derivative(value)}

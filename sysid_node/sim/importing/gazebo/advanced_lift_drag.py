@@ -91,21 +91,25 @@ class AdvancedLiftDrag:
     def _steady(self, alpha: Array, beta: Array, control: Array) -> Array:
         """Coefficients (N, 6) without rates."""
         v = self.values
-        sigma = self._blending(alpha)
+        sigma = blending(alpha, v["alpha_stall"])
         plate = 2.0 * np.sign(alpha) * np.sin(alpha) ** 2 * np.cos(alpha)
         lift = (1.0 - sigma) * (v["CL0"] + v["CLa"] * alpha) + sigma * plate + v["CLb"] * beta + control[:, 0]
-        ratio = v["AR"]
-        flat = 2.0 / (1.0 + np.exp(_PLATE[0] + _PLATE[1] * max(ratio, 1.0 / ratio)))
-        induced = lift**2 / (np.pi * ratio * v["eff"])
-        drag = (1.0 - sigma) * (v["CD0"] + induced) + sigma * np.abs(flat * (0.5 - 0.5 * np.cos(2.0 * alpha)))
+        induced = lift**2 / (np.pi * v["AR"] * v["eff"])
+        drag = (1.0 - sigma) * (v["CD0"] + induced) + sigma * flat_plate_drag(alpha, v["AR"])
         attached = np.clip(alpha, -v["alpha_stall"], v["alpha_stall"])
         pitch = v["Cem0"] + v["Cema"] * attached + v["Cema_stall"] * (alpha - attached) + v["Cemb"] * beta
         lateral = [v[f"{n}a"] * alpha + v[f"{n}b"] * beta for n in ("CY", "Cell", "Cen")]
         columns = [lift, drag + control[:, 1], lateral[0] + control[:, 2], lateral[1] + control[:, 3]]
         return np.column_stack([*columns, pitch + control[:, 4], lateral[2] + control[:, 5]])
 
-    def _blending(self, alpha: Array) -> Array:
-        """0 in attached flow, 1 beyond stall."""
-        stall = self.values["alpha_stall"]
-        below, above = np.exp(-_SHARPNESS * (alpha - stall)), np.exp(_SHARPNESS * (alpha + stall))
-        return np.asarray((1.0 + below + above) / ((1.0 + below) * (1.0 + above)))
+
+def blending(alpha: Array, stall: float) -> Array:
+    """0 in attached flow, 1 beyond the angle of stall (rad)."""
+    below, above = np.exp(-_SHARPNESS * (alpha - stall)), np.exp(_SHARPNESS * (alpha + stall))
+    return np.asarray((1.0 + below + above) / ((1.0 + below) * (1.0 + above)))
+
+
+def flat_plate_drag(alpha: Array, ratio: float) -> Array:
+    """Drag coefficient beyond stall of a wing of an aspect ratio."""
+    flat = 2.0 / (1.0 + np.exp(_PLATE[0] + _PLATE[1] * max(ratio, 1.0 / ratio)))
+    return np.asarray(np.abs(flat * (0.5 - 0.5 * np.cos(2.0 * alpha))))

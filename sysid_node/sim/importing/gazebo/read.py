@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 _TURN = np.array([1.0, -1.0, -1.0])
 
 _ALPHA = np.deg2rad(np.arange(-16.0, 24.01, 1.0))
+#: A joint controller's largest command where none is stated.
+_NO_COMMAND_LIMIT = 1000.0
+
 _BETA = np.deg2rad([-15.0, -10.0, -5.0, 0.0, 5.0, 10.0, 15.0])
 
 
@@ -48,15 +51,27 @@ class Rotor:
 def read_gazebo(path: Path, airspeed: float | None = None) -> Imported:
     """The aircraft of an SDF with AdvancedLiftDrag or LiftDrag plugins. Raises InputError."""
     model = read_sdf(path)
+    plant, loads, kinds = _plant(model, path.name)
+    aircraft, level = aircraft_of(plant, airspeed)
+    return Imported(aircraft, tuple(_notes(model, loads, level.throttle, *kinds)))
+
+
+def gazebo_plant(path: Path) -> Plant:
+    """The equations of an SDF with AdvancedLiftDrag or LiftDrag plugins. Raises InputError."""
+    return _plant(read_sdf(path), path.name)[0]
+
+
+def _plant(model: SdfModel, file: str) -> tuple[Plant, _Loads, tuple[bool, bool]]:
+    """The equations, the loads in them, and whether there are simple and advanced plugins."""
     simple = [LiftDrag.of(p, model.file) for p in model.plugins_named("LiftDrag", "LiftDragPlugin")]
     advanced = [AdvancedLiftDrag.of(p, model.file) for p in model.plugins_named("AdvancedLiftDrag")]
     if not simple and not advanced:
         raise InputError(
-            f"{path}: model {model.name!r} has no plugin LiftDrag or AdvancedLiftDrag; nothing is to be read"
+            f"{model.file}: model {model.name!r} has no plugin LiftDrag or AdvancedLiftDrag; nothing is to be read"
         )
     missing = {name for name in (*(w.link for w in simple), *(w.link for w in advanced)) if name not in model.links}
     if missing:
-        raise InputError(f"{path}: a lift-drag plugin names the link {min(missing)!r}, which the model does not have")
+        raise InputError(f"{model.file}: a lift-drag plugin names the link {min(missing)!r}, which the model has not")
     mass, centre, inertia = masses(model)
     geometry, density = _geometry(simple, advanced)
     loads = _Loads(model, centre, simple, advanced, _rotor(model, centre))
@@ -64,7 +79,7 @@ def read_gazebo(path: Path, airspeed: float | None = None) -> Imported:
     loads.controls = controls
     plant = Plant(
         name=model.name,
-        source=f"Gazebo's model {model.name} in {path.name}",
+        source=f"Gazebo's model {model.name} in {file}",
         mass=mass,
         inertia=Inertia(*(float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 2)))),
         geometry=geometry,
@@ -75,8 +90,7 @@ def read_gazebo(path: Path, airspeed: float | None = None) -> Imported:
         nodes=_nodes(simple, advanced),
         effects=_effects(model, controls, loads.rotor),
     )
-    aircraft, level = aircraft_of(plant, airspeed)
-    return Imported(aircraft, tuple(_notes(model, loads, level.throttle, bool(simple), bool(advanced))))
+    return plant, loads, (bool(simple), bool(advanced))
 
 
 class _Loads:
@@ -201,13 +215,17 @@ def _limits(model: SdfModel, joints: Sequence[str]) -> dict[str, float]:
 
 def _effects(model: SdfModel, controls: Mapping[str, Control], rotor: Rotor | None) -> dict[str, dict[str, float]]:
     """Servos and motor: a position controller against a joint's damping is a lag of damping over gain."""
-    lag = {}
+    lag, rate = {}, {}
     servos = {(p.findtext("joint_name") or "").strip(): p for p in model.plugins_named("JointPositionController")}
     for name, control in controls.items():
-        times = [_servo_lag(model, joint, servos[joint]) for joint in control.joints if joint in servos]
+        driven = {joint: servos[joint] for joint in control.joints if joint in servos}
+        times = [_servo_lag(model, joint, servo) for joint, servo in driven.items()]
         if times and max(times) > 0.0:
             lag[name] = sum(times) / len(times)
-    effects = {"actuator_lag": lag} if lag else {}
+        rates = [abs(control.joints[joint]) * _servo_rate(model, joint, servo) for joint, servo in driven.items()]
+        if rates and math.isfinite(sum(rates)):
+            rate[name] = sum(rates)
+    effects = {name: values for name, values in (("actuator_lag", lag), ("actuator_rate_limit", rate)) if values}
     if rotor is not None:
         up, down = rotor.constants["timeConstantUp"], rotor.constants["timeConstantDown"]
         if up + down > 0.0:
@@ -220,8 +238,26 @@ def _servo_lag(model: SdfModel, joint: str, controller: Element) -> float:
     gain, rate_gain = (
         number_in(controller, tag, value, model.file) for tag, value in (("p_gain", 1.0), ("d_gain", 0.1))
     )
+    if _follows_at_once(controller):
+        return 0.0
     damping = model.joint_number(joint, "axis/dynamics/damping") or 0.0
     return (damping + (rate_gain if controller.find("d_gain") is not None else 0.0)) / gain if gain > 0.0 else 0.0
+
+
+def _servo_rate(model: SdfModel, joint: str, controller: Element) -> float:
+    """The joint's largest rate (rad/s): its largest command, or what this gives against the joint's damping."""
+    most = number_in(controller, "cmd_max", _NO_COMMAND_LIMIT, model.file)
+    if most >= _NO_COMMAND_LIMIT:
+        return math.inf
+    damping = model.joint_number(joint, "axis/dynamics/damping") or 0.0
+    if _follows_at_once(controller):
+        return most
+    return most / damping if damping > 0.0 else math.inf
+
+
+def _follows_at_once(controller: Element) -> bool:
+    """Whether the joint moves to its command without a control loop."""
+    return (controller.findtext("use_velocity_commands") or "").strip().lower() in ("true", "1")
 
 
 def _rotor(model: SdfModel, centre: Array) -> Rotor | None:
