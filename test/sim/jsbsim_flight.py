@@ -64,8 +64,10 @@ def start(fdm: jsbsim.FGFDMExec, initial, trim, max_thrust: float) -> None:
         fdm[name] = float(value)
     command(fdm, trim, max_thrust)
     fdm.run_ic()
+    frames = round(2.0 / fdm.get_delta_t())
     fdm.suspend_integration()
-    for _ in range(1000):  # JSBSim's delays begin empty: let them fill while the aircraft stands still
+    # JSBSim's delays and lags begin empty: let them fill for two seconds while the aircraft stands still
+    for _ in range(frames):
         fdm.run()
     fdm.resume_integration()
 

@@ -12,10 +12,10 @@ from sysid_node.sim.importing.jsbsim.program import FOOT
 from sysid_node.sim.model.layout import reference_flight
 
 #: Controls in the propeller's slipstream.
-_IN_SLIPSTREAM = ("elevator", "rudder")
+IN_SLIPSTREAM = ("elevator", "rudder")
 
 #: The model's own lift coefficient, of the frame before, and the thrust in lbf.
-_LIFT: tuple[Factor, ...] = ("forces/fwz-aero-lbs", one_over("aero/qbar-psf", "metrics/Sw-sqft"))
+OWN_LIFT: tuple[Factor, ...] = ("forces/fwz-aero-lbs", one_over("aero/qbar-psf", "metrics/Sw-sqft"))
 
 Change = Mapping[str, float]
 
@@ -26,6 +26,7 @@ class ModelProperties:
 
     deflections: Mapping[str, tuple[str, float]]  # by control: property, and rad (the aircraft file's sign) per unit
     thrust: str | None  # of the thrust along the body's x axis, lbf
+    lift: tuple[Factor, ...] = OWN_LIFT  # of the lift coefficient
 
 
 def increments_between(before: Aircraft, after: Aircraft, model: ModelProperties) -> Increments:
@@ -54,7 +55,7 @@ def regressor(name: str, before: Aircraft, model: ModelProperties) -> tuple[floa
     if name == "V":
         return FOOT / before.reference.airspeed, REGRESSORS["V"]
     if name == "k":
-        return 1.0, (*_LIFT, *_LIFT)
+        return 1.0, (*model.lift, *model.lift)
     controls = {control.symbol: key for key, control in before.controls.items()}
     if name in controls:
         place, unit = model.deflections[controls[name]]
@@ -100,8 +101,8 @@ def _asymmetry(found: Increments, change: Change, aircraft: Aircraft, model: Mod
 def _drag_rise(found: Increments, change: Change, aircraft: Aircraft, model: ModelProperties) -> None:
     lift, _ = reference_flight(aircraft)
     value = change.get("parabola", 0.0)  # (CL - CL0)^2 written out
-    found.add("CD", value, *_LIFT, *_LIFT)
-    found.add("CD", -2.0 * lift * value, *_LIFT)
+    found.add("CD", value, *model.lift, *model.lift)
+    found.add("CD", -2.0 * lift * value, *model.lift)
     found.add("CD", lift * lift * value)
 
 
@@ -115,7 +116,7 @@ def _nonlinear_controls(found: Increments, change: Change, aircraft: Aircraft, m
 def _propwash(found: Increments, change: Change, aircraft: Aircraft, model: ModelProperties) -> None:
     if model.thrust is None:
         return
-    for control in _IN_SLIPSTREAM:
+    for control in IN_SLIPSTREAM:
         for coefficient, slope in _slopes(aircraft, control):
             unit, factors = regressor(aircraft.controls[control].symbol, aircraft, model)
             pressure = one_over("aero/qbar-psf", "metrics/Sw-sqft")

@@ -8,7 +8,7 @@ from the lift. Added thrust acts there as well.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
@@ -86,7 +86,15 @@ def _property(coefficient: str) -> str:
 def _sum(parent: Element, terms: list[Term]) -> None:
     total = text_element(parent, "sum", "")
     text_element(total, "value", 0.0)
+    add_terms(total, terms)
+
+
+def add_terms(total: Element, terms: Iterable[Term]) -> None:
+    """Put terms into a sum."""
     for term in terms:
+        if not term.factors:
+            text_element(total, "value", term.value)
+            continue
         product = product_of(total, [], term.value)
         for factor in term.factors:
             if isinstance(factor, str):
@@ -155,7 +163,10 @@ def less(name: str | tuple[str, ...], value: float, power: int = 1) -> Factor:
     def write(parent: Element) -> None:
         holder = text_element(parent, "pow", "") if power > 1 else parent
         difference = text_element(holder, "difference", "")
-        product_of(difference, names)
+        if len(names) == 1:
+            text_element(difference, "property", names[0])
+        else:
+            product_of(difference, names)
         text_element(difference, "value", value)
         if power > 1:
             text_element(holder, "value", float(power))

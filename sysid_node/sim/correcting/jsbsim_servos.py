@@ -36,6 +36,7 @@ class ServoChange:
     servo: JsbsimServo
     damping: float = 0.0
     lost: float = 0.0  # share of the control's effect
+    stuck: tuple[float, float] = (0.0, 0.0)  # how much of the surface is jammed, and where (rad)
 
 
 def change_servo(
@@ -60,7 +61,8 @@ def change_servo(
     writers = _writers(sections, surface)
     for holder, writer, name in writers:
         slope = _slope(surface, name)
-        _put_behind(holder, writer, name, _new_components(name, slope, changed, change))
+        first, prefix = _new_name(name, "commanded"), _new_name(name, "")[:-1]
+        _put_behind(holder, writer, name, servo_components(first, prefix, slope, changed, change))
     return bool(writers)
 
 
@@ -147,29 +149,47 @@ def _set(actuator: Element, tag: str, total: float, before: float, gain: float) 
         actuator[-1].tail = "\n      "
 
 
-def _new_components(name: str, slope: float, parts: Mapping[str, float], change: ServoChange) -> list[Element]:
-    """A filter where the lag is of second order, an actuator, and a gain where effect is lost; some of them."""
+def servo_components(
+    first: str, prefix: str, slope: float, parts: Mapping[str, float], change: ServoChange
+) -> list[Element]:
+    """The components of a servo: a filter where the lag is of second order, an actuator, and a gain where effect is
+    lost; some of them or none.
+
+    ``first`` is the property that the first reads. Their names begin with ``prefix``; ``slope`` is in units of the
+    property for each rad of the control. ``parts`` are the numbers by the actuator's elements, s, rad and rad/s.
+    """
     components: list[Element] = []
     values = {element: value for element, value in parts.items() if value}
 
     def source() -> str:
-        return str(components[-1].get("name")) if components else _new_name(name, "commanded")
+        return str(components[-1].get("name")) if components else first
 
     if change.damping and "lag" in values:
-        components.append(_second_order(_new_name(name, "lag"), source(), values.pop("lag"), change.damping))
+        components.append(_second_order(f"{prefix}-lag", source(), values.pop("lag"), change.damping))
     if values:
-        actuator = Element("actuator", name=_new_name(name, "servo"))
+        actuator = Element("actuator", name=f"{prefix}-servo")
         text_element(actuator, "input", source())
         for _, _, element in PARTS:
             if element in values:
                 text_element(actuator, element, _in_units(element, values[element], slope))
         components.append(actuator)
+    amount, place = change.stuck
+    if amount:
+        components.append(_gain(f"{prefix}-moved", source(), 1.0 - amount))
+        jammed = Element("summer", name=f"{prefix}-jammed")
+        text_element(jammed, "input", source())
+        text_element(jammed, "bias", amount * place * slope)
+        components.append(jammed)
     if change.lost:
-        gain = Element("pure_gain", name=_new_name(name, "effect"))
-        text_element(gain, "input", source())
-        text_element(gain, "gain", 1.0 - change.lost)
-        components.append(gain)
+        components.append(_gain(f"{prefix}-effect", source(), 1.0 - change.lost))
     return components
+
+
+def _gain(name: str, source: str, value: float) -> Element:
+    gain = Element("pure_gain", name=name)
+    text_element(gain, "input", source)
+    text_element(gain, "gain", value)
+    return gain
 
 
 def _in_units(element: str, value: float, slope: float) -> float:

@@ -47,20 +47,34 @@ def stall_channel(values: Mapping[str, float]) -> Element:
     return channel
 
 
-def add_stall(found: Increments, values: Mapping[str, float]) -> None:
-    """Lift lost, and drag and pitching moment added, of a model that had no such effect."""
+#: The model's own lift coefficient, of the frame before.
+_OWN_LIFT: tuple[Factor, ...] = ("forces/fwz-aero-lbs", one_over("aero/qbar-psf", "metrics/Sw-sqft"))
+
+
+def add_stall(found: Increments, values: Mapping[str, float], lift: tuple[Factor, ...] | None = _OWN_LIFT) -> None:
+    """Lift lost, and drag and pitching moment added, of a model that had no such effect.
+
+    ``lift`` are factors of the attached flow's lift coefficient; None where the lift is written by ``lift_factor``.
+    """
     shape = {**SHAPE, **values}
-    lift = ("forces/fwz-aero-lbs", one_over("aero/qbar-psf", "metrics/Sw-sqft"))
-    # 1 - ((1 + sqrt X) / 2)^2
-    found.add("CL", -shape["depth"], *lift, _lost)
+    if lift is not None:
+        found.add("CL", -shape["depth"], *lift, _lost)
     for name, size in (("CD", shape["CD_X"]), ("Cm", shape["Cm_X"])):
         found.add(name, -shape["depth"] * size, _less_one)
+
+
+def lift_factor(product: Element, values: Mapping[str, float]) -> None:
+    """Lift as a fraction of the attached flow's, as a factor of a product: 1 - depth (1 - ((1 + sqrt X) / 2)^2)."""
+    difference = text_element(product, "difference", "")
+    text_element(difference, "value", 1.0)
+    _lost(product_of(difference, [], {**SHAPE, **values}["depth"]))
 
 
 _less_one: Factor = less(_X, 1.0)
 
 
 def _lost(parent: Element) -> None:
+    """The factor 1 - ((1 + sqrt X) / 2)^2."""
     difference = text_element(parent, "difference", "")
     text_element(difference, "value", 1.0)
     power = text_element(difference, "pow", "")

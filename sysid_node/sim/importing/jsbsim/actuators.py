@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -18,6 +19,7 @@ class JsbsimServo:
     """One control's servo, in the surface's units (s, rad, rad/s), and what of it was not understood."""
 
     lag: float = 0.0
+    damping: float = 0.0  # of a lag of second order; 0: of first order
     rate: float = 0.0  # 0 = without limit
     delay: float = 0.0
     free_play: float = 0.0
@@ -79,6 +81,8 @@ def read_servo(chain: Sequence[Element], gains: Mapping[str, float], rate: float
         elif component.tag == "lag_filter":
             corner = _number(component, "c1")
             servo.lag += 1.0 / corner if corner > 0.0 else 0.0
+        elif component.tag == "second_order_filter":
+            _add_second_order(servo, component)
         elif component.tag == "kinematic":
             slowest = _kinematic_rate(component)
             if slowest > 0.0:
@@ -98,6 +102,26 @@ def _add_actuator(servo: JsbsimServo, component: Element, gain: float, rate: flo
         servo.delay += _number(component, "delay") / (rate if frames else 1.0)
     servo.free_play += _number(component, "hysteresis_width") * gain
     servo.offset += _number(component, "bias") * gain
+
+
+def _add_second_order(servo: JsbsimServo, component: Element) -> None:
+    """A filter 1 / (T^2 s^2 + 2 damping T s + 1): alone a servo of second order, beside other lags a lag as late."""
+    c1, c2, c3, c4, c5, c6 = (_number(component, f"c{k}") for k in range(1, 7))
+    if c1 or c2 or c3 != c6 or c3 <= 0.0 or c4 <= 0.0 or c5 < 0.0:
+        return
+    time = math.sqrt(c4 / c6)
+    if servo.lag:
+        servo.lag += c5 / c6
+    else:
+        servo.lag, servo.damping = time, 0.5 * c5 / (c6 * time)
+
+
+def throttle_times(sections: Sequence[Element], lever: str) -> tuple[float, float]:
+    """Lag and delay (s) of the actuators that read the throttle's lever."""
+    servo = JsbsimServo()
+    for actuator in (a for section in sections for a in section.iter("actuator") if lever in inputs_of(a)):
+        _add_actuator(servo, actuator, 1.0, 1.0)
+    return servo.lag, servo.delay
 
 
 def _number(component: Element, tag: str) -> float:

@@ -135,7 +135,8 @@ class CoefficientModel:
             points = [x for x in points_of_tables.get(name, []) if low <= x <= high]
             axes[name] = TableAxis.of([*regular, *points], centre[name], 0.004)
         for name, size in _RATES.items():
-            axes[name] = TableAxis.of(size * np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), 0.0, 0.1 * size)
+            points = [x for x in points_of_tables.get(name, []) if abs(x) <= 2.0 * size]
+            axes[name] = TableAxis.of([*(size * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])), *points], 0.0, 0.1 * size)
         if "throttle" in centre:
             levers = [x for x in points_of_tables.get("throttle", []) if 0.0 <= x <= 1.0]
             axes["throttle"] = TableAxis.of([*_THROTTLES, *levers], centre["throttle"], 0.02)
@@ -161,6 +162,8 @@ class CoefficientModel:
             "aero/beta-deg": ("beta", degree),
             "velocities/mach": ("V", 1.0 / max(self.mach_per_speed, 1e-9)),
             LEVER: ("throttle", 1.0),
+            **{f"aero/reduced/{rate}": (rate, 1.0) for rate in _RATES},  # sim.export.jsbsim writes such models
+            "fcs/throttle-lagged-norm": ("throttle", 1.0),
             **{s.position: (symbol, s.sign * s.unit) for symbol, s in self._surfaces.items()},
         }
         points: dict[str, list[float]] = {}

@@ -90,8 +90,11 @@ def _included(files: ModelFiles, file: str) -> Element:
     raise InputError(f"{files.main}: refers to {name}, which is not found; put it beside the model")
 
 
-def copy_model(files: ModelFiles, place: Path, without: Collection[str]) -> ModelFiles:
-    """A copy under ``place`` without the components that write any of these properties, and without outputs."""
+def copy_model(files: ModelFiles, place: Path, without: Collection[str], at_once: Collection[str] = ()) -> ModelFiles:
+    """A copy under ``place`` without the components that write any of these properties, and without outputs.
+
+    Actuators that read a property of ``at_once`` have no lag and no delay in it.
+    """
     folder = place / "aircraft" / "model"
     shutil.copytree(files.folder, folder, ignore=lambda _, names: [n for n in names if _unneeded(n)])
     (folder / files.main.name).rename(folder / "model.xml")
@@ -99,7 +102,7 @@ def copy_model(files: ModelFiles, place: Path, without: Collection[str]) -> Mode
     if files.systems.is_dir():
         shutil.copytree(files.systems, systems)
     for path in [*folder.rglob("*.xml"), *systems.rglob("*.xml")]:
-        _strip(path, set(without), main=path == folder / "model.xml")
+        _strip(path, set(without), set(at_once), main=path == folder / "model.xml")
     return ModelFiles(folder, "model", files.engines, systems, files.label)
 
 
@@ -107,7 +110,7 @@ def _unneeded(name: str) -> bool:
     return Path(name).suffix.lower() in (".png", ".jpg", ".jpeg", ".ac", ".rgb", ".pdf", ".txt", ".wav", ".gif")
 
 
-def _strip(path: Path, without: set[str], main: bool) -> None:
+def _strip(path: Path, without: set[str], at_once: set[str], main: bool) -> None:
     """Remove in place what writes these properties."""
     try:
         root = parse_xml(path)
@@ -123,6 +126,10 @@ def _strip(path: Path, without: set[str], main: bool) -> None:
         for name in sorted(written):  # others may read what a removed component wrote
             holder.insert(0, Element("property"))
             holder[0].text = name
+    for actuator in (a for holder in holders for a in holder.iter("actuator")):
+        if at_once & {(i.text or "").strip() for i in actuator.findall("input")}:
+            for element in [*actuator.findall("lag"), *actuator.findall("delay")]:
+                actuator.remove(element)
     if main:
         for tag in ("output", "input"):
             for element in root.findall(tag):

@@ -64,6 +64,8 @@ def read_model(model: str, airspeed: float | None = None, altitude: float | None
         model_ = CoefficientModel(program, survey.surfaces, survey.steady)
         axes = model_.axes(aerodynamics)
         expansion = expand(model_, axes, _tolerance(model_, axes))
+        if any(survey.lever_times):
+            model_.motor_lag, model_.throttle_delay = survey.lever_times
         aircraft = _aircraft(survey.files, program, survey.surfaces, survey.steady, model_, expansion, survey.servos)
         notes = [
             *_notes(program, survey.surfaces, survey.steady, model_, survey.servos),
@@ -129,6 +131,9 @@ def _effects(
     for control, servo in servos.items():
         for effect, size in servo.effects().items():
             effects.setdefault(effect, {})[control] = UncertainValue(size)
+    dampings = [servo.damping for servo in servos.values() if servo.lag]
+    if dampings and max(dampings) > 0.0:
+        effects["actuator_lag"] |= _second_order(servos, dampings)
     if model.throttle_delay:
         delay = UncertainValue(model.throttle_delay, _LAG_SHARE * model.throttle_delay)
         effects.setdefault("command_delay", {})["throttle"] = delay
@@ -139,6 +144,14 @@ def _effects(
         terms = {"CL_alphadot": lift, "Cm_alphadot": moment}
         effects["unsteady_aerodynamics"] = {name: UncertainValue(float(value)) for name, value in terms.items()}
     return effects
+
+
+def _second_order(servos: Mapping[str, JsbsimServo], dampings: Sequence[float]) -> dict[str, UncertainValue]:
+    """The one damping of all servos; where they differ, lags of first order that follow a ramp as late."""
+    if max(dampings) - min(dampings) < 1e-6:
+        return {"damping": UncertainValue(dampings[0])}
+    late = {n: s.lag * (2.0 * s.damping if s.damping else 1.0) for n, s in servos.items() if s.lag}
+    return {name: UncertainValue(lag) for name, lag in late.items()}
 
 
 def _notes(
@@ -169,6 +182,10 @@ def _notes(
     ]
     if left:
         notes.append(f"Terms of {', '.join(left)} in the rate of alpha are left out; a file has those of CL and Cm.")
+    if len({round(s.damping, 6) for s in servos.values() if s.lag}) > 1:
+        notes.append(
+            "Servos of second order have different dampings; a file has one, and lags of first order are held."
+        )
     if program.powered:
         notes.append(_thrust_note(steady, model))
     notes.append(
