@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from aircraft_loads import coefficients
+from level_flight import level_flight
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import LookupTable
@@ -56,6 +57,74 @@ def test_jsbsim_holds_tables_over_the_throttle(kestrel, tmp_path):
         for a in (replace(kestrel, tables=(table,)), found)
     )
     np.testing.assert_allclose(read, known, atol=1e-6)
+
+
+SERVOS = {
+    "actuator_lag": {"elevator": 0.03, "aileron": 0.05, "rudder": 0.02},
+    "actuator_rate_limit": {"elevator": 2.0, "aileron": 3.0},
+    "actuator_backlash": {"rudder": 0.02},
+    "actuator_bias": {"elevator": 0.01},
+    "command_delay": {"elevator": 0.02, "throttle": 0.1},
+    "motor_lag": {"time_constant": 0.3},
+}
+
+
+def test_jsbsim_holds_servos_and_motor(kestrel, tmp_path):
+    """Every servo and motor with its numbers, among them those of second order."""
+    pytest.importorskip("jsbsim", reason="JSBSim is not installed")
+    for name, effects in (("first", SERVOS), ("second", SERVOS | {"actuator_lag": SECOND_ORDER})):
+        path = tmp_path / f"{name}.xml"
+        path.write_text(jsbsim_model(kestrel, effects))
+        found = read_jsbsim(str(path), 16.0, 0.0).aircraft.effect_values()
+        assert {n: pytest.approx(v, rel=1e-6) for n, v in effects.items()} == found
+
+
+SECOND_ORDER = {"elevator": 0.03, "aileron": 0.05, "rudder": 0.02, "damping": 0.7}
+
+
+def table(coefficient, over, points, function):
+    """A table whose values are a function of its points."""
+    grids = np.meshgrid(*points, indexing="ij")
+    values = function(*grids)
+    rows = tuple(map(tuple, values)) if len(over) == 2 else tuple(values)
+    return LookupTable(coefficient, over, tuple(map(tuple, points)), rows)
+
+
+#: A table over each variable, and over two of them at once.
+TABLES = (
+    table("CL", ("alpha",), [np.array([-0.2, 0.0, 0.1, 0.3])], lambda a: -0.8 * a**2),
+    table("CY", ("beta",), [np.array([-0.2, -0.05, 0.0, 0.05, 0.2])], lambda b: 2.0 * b**3),
+    table("Cm", ("de",), [np.array([-0.3, 0.0, 0.3])], lambda d: 0.2 * d**2),
+    table("Cn", ("dr", "beta"), [np.array([-0.3, 0.0, 0.3]), np.array([-0.2, 0.0, 0.2])], lambda d, b: 0.1 * d * b),
+    table("Cl", ("p",), [np.array([-0.15, 0.0, 0.1])], lambda p: 0.5 * p**2),
+    table("Cm", ("q",), [np.array([-0.03, 0.01, 0.03])], lambda q: 40.0 * q**2),
+    table("Cn", ("r", "alpha"), [np.array([-0.15, 0.0, 0.15]), np.array([-0.1, 0.2])], lambda r, a: 0.3 * r * a),
+)
+
+
+@pytest.fixture(scope="module")
+def with_tables(kestrel, tmp_path_factory):
+    """The aircraft with tables, and what comes back."""
+    pytest.importorskip("jsbsim", reason="JSBSim is not installed")
+    path = tmp_path_factory.mktemp("jsbsim") / "kestrel.xml"
+    known = replace(kestrel, tables=TABLES)
+    path.write_text(jsbsim_model(known))
+    return known, read_jsbsim(str(path), 16.0, 0.0).aircraft
+
+
+@pytest.mark.parametrize("over", [t.over for t in TABLES], ids="-".join)
+def test_jsbsim_holds_tables_over_every_variable(with_tables, over):
+    """At the tables' points, the others as in level flight."""
+    known, found = with_tables
+    level = level_flight(found)  # the one about which the tables were read
+    points = next(t.points for t in TABLES if t.over == over)
+    columns = [grid.ravel() for grid in np.meshgrid(*points, indexing="ij")]
+    x = grid(**dict(zip(over, columns, strict=True)))
+    for name in ("alpha", "de", "da", "dr"):
+        if name not in over:
+            x[name] = np.full(len(columns[0]), level[name])
+    ours, theirs = coefficients(known, x), coefficients(found, x)
+    np.testing.assert_allclose(theirs - ours, 0.0, atol=1e-6)
 
 
 #: Coefficients of which both formats hold all derivatives: CL, CY, Cl, Cm, Cn.
