@@ -7,63 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sysid_node.aircraft.model import Aircraft, Control, Derivative, Geometry, Inertia, ReferenceCondition, Throttle
-from sysid_node.aircraft.model import UncertainValue as Value
-from sysid_node.errors import InputError
-
 pytest.importorskip("jsbsim", reason="JSBSim is not installed")
 
+from corrected_model import added_load, having, running
+
+from sysid_node.aircraft.model import Derivative, ReferenceCondition
+from sysid_node.errors import InputError
 from sysid_node.sim.correcting.jsbsim_model import write_corrected
 from sysid_node.sim.correcting.user_simulator import user_simulator
-from sysid_node.sim.importing.jsbsim.files import copy_model
-from sysid_node.sim.importing.jsbsim.program import Program
 from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS
 from sysid_node.sim.importing.jsbsim.survey import survey_model
 from sysid_node.sim.model.layout import reference_flight
-
-POUND, FOOT = 4.4482216152605, 0.3048
-
-
-@pytest.fixture(scope="module")
-def survey():
-    return survey_model("c172p", 52.0, 900.0)
-
-
-@pytest.fixture(scope="module")
-def file(survey):
-    """A file with the model's masses and sizes and derivatives that only serve as a beginning."""
-    names = "CL_0 CL_alpha CL_de CD_0 CY_beta Cl_p Cl_da Cm_0 Cm_alpha Cm_q Cm_de Cn_beta Cn_dr"
-    derivatives = {name: Derivative(0.3) for name in names.split()}
-    symbols = {"elevator": "de", "aileron": "da", "rudder": "dr"}
-    return Aircraft(
-        name="c172p",
-        source="JSBSim's model",
-        mass=survey.mass,
-        inertia=Inertia(**survey.inertia),
-        geometry=Geometry(*survey.geometry),
-        reference=ReferenceCondition(52.0, 1.12),
-        controls={name: Control(name, symbol, {name: 1.0}) for name, symbol in symbols.items()},
-        derivatives=derivatives,
-        throttle=Throttle("throttle", 3000.0),
-        ideal=True,
-    )
-
-
-def having(aircraft, **effects):
-    stated = {name: {key: Value(value) for key, value in values.items()} for name, values in effects.items()}
-    return replace(aircraft, effects={**aircraft.effects, **stated})
-
-
-def running(files, folder, rate=400.0, without=()):
-    return Program(copy_model(files, folder, without), rate)
-
-
-def added_load(program):
-    """Force (N) and moment (N m) of external reactions, of which the model itself has none, and the density."""
-    fdm = program.fdm
-    force = [fdm[f"forces/fb{axis}-external-lbs"] * POUND for axis in "xyz"]
-    moment = [fdm[f"moments/{axis}-external-lbsft"] * POUND * FOOT for axis in "lmn"]
-    return np.array([*force, *moment]), program.loads().density
 
 
 def test_increments_of_coefficients_are_those_of_the_file(survey, file, tmp_path):
