@@ -119,7 +119,9 @@ def _add_second_order(servo: JsbsimServo, component: Element) -> None:
 def throttle_times(sections: Sequence[Element], lever: str) -> tuple[float, float]:
     """Lag and delay (s) of the actuators that read the throttle's lever."""
     servo = JsbsimServo()
-    for actuator in (a for section in sections for a in section.iter("actuator") if lever in inputs_of(a)):
+    actuators = [a for section in sections for a in section.iter("actuator")]
+    reading = [a for a in actuators if lever in {name.partition("[")[0] for name in inputs_of(a)}]
+    for actuator in reading[:1]:  # those of several engines are alike
         _add_actuator(servo, actuator, 1.0, 1.0)
     return servo.lag, servo.delay
 

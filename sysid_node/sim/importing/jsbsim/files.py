@@ -127,7 +127,7 @@ def _strip(path: Path, without: set[str], at_once: set[str], main: bool) -> None
             holder.insert(0, Element("property"))
             holder[0].text = name
     for actuator in (a for holder in holders for a in holder.iter("actuator")):
-        if at_once & {(i.text or "").strip() for i in actuator.findall("input")}:
+        if at_once & {(i.text or "").strip().partition("[")[0] for i in actuator.findall("input")}:
             for element in [*actuator.findall("lag"), *actuator.findall("delay")]:
                 actuator.remove(element)
     if main:

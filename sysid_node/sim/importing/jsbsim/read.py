@@ -64,8 +64,8 @@ def read_model(model: str, airspeed: float | None = None, altitude: float | None
         model_ = CoefficientModel(program, survey.surfaces, survey.steady)
         axes = model_.axes(aerodynamics)
         expansion = expand(model_, axes, _tolerance(model_, axes))
-        if any(survey.lever_times):
-            model_.motor_lag, model_.throttle_delay = survey.lever_times
+        lag, delay = survey.lever_times
+        model_.motor_lag, model_.throttle_delay = model_.motor_lag + lag, model_.throttle_delay + delay
         aircraft = _aircraft(survey.files, program, survey.surfaces, survey.steady, model_, expansion, survey.servos)
         notes = [
             *_notes(program, survey.surfaces, survey.steady, model_, survey.servos),

@@ -48,7 +48,7 @@ class ModelSurvey:
     geometry: tuple[float, float, float]  # m^2, m, m
     cg_in: tuple[float, float, float]  # in JSBSim's structural axes, inches
     engines: int
-    lever_times: tuple[float, float] = (0.0, 0.0)  # lag and delay (s) of a throttle that moves no engine
+    lever_times: tuple[float, float] = (0.0, 0.0)  # lag and delay (s) before the engine, or the thrust
 
 
 def survey_model(model: str, airspeed: float | None = None, altitude: float | None = None) -> ModelSurvey:
@@ -90,7 +90,7 @@ def _survey(
     found = {s.name: _servo(stock, s, systems, replace(start, airspeed=speeds[0])) for s in surfaces}
     servos, chains = {n: servo for n, (servo, _) in found.items()}, {n: chain for n, (_, chain) in found.items()}
     moved = {name for surface in surfaces for name in surface.properties}
-    program = Program(copy_model(files, place / "driven", moved, () if stock.engines else (LEVER,)))
+    program = Program(copy_model(files, place / "driven", moved, (LEVER,)))
     steady = _steady(files, program, surfaces, [replace(start, airspeed=speed) for speed in speeds])
     surfaces = _usual_signs(program, surfaces, steady)
     steady = SteadyFlight(steady.state, {s.name: s.sign * steady.deflections[s.name] for s in surfaces})
@@ -106,7 +106,7 @@ def _survey(
         program.geometry,
         cg,
         program.engines,
-        (0.0, 0.0) if stock.engines else throttle_times(systems, LEVER),
+        throttle_times(systems, LEVER),
     )
     return survey, program, aerodynamics
 

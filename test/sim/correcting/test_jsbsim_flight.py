@@ -1,0 +1,67 @@
+"""Short flights in JSBSim itself, of an exported aircraft. Truth: this package's simulator of the same aircraft."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plain import steps
+
+pytest.importorskip("jsbsim", reason="JSBSim is not installed")
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Sensors
+from sysid_node.dynamics.attitude import euler_angles
+from sysid_node.sim import Simulator, trim_flight
+from sysid_node.sim.correcting.jsbsim_flight import JsbsimFlyer
+from sysid_node.sim.export.jsbsim import jsbsim_model
+from sysid_node.sim.importing.jsbsim.survey import survey_model
+
+RATE, SECONDS = 100.0, 6.0
+
+EFFECTS = {"actuator_lag": {"elevator": 0.05, "aileron": 0.03, "rudder": 0.04}, "drag_rise": {"parabola": 0.1}}
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """States, specific forces and those of JSBSim: steps on all surfaces, begun from trim and anew every 2 s."""
+    kestrel = replace(load_aircraft("kestrel"), sensors=Sensors())
+    path = tmp_path_factory.mktemp("flyer") / "kestrel.xml"
+    path.write_text(jsbsim_model(kestrel, EFFECTS))
+    simulator = Simulator(kestrel, RATE)
+    theta = simulator.vector(EFFECTS)
+    trim = trim_flight(simulator, theta=theta)
+    time = np.arange(round(SECONDS * RATE)) / RATE
+    moves = [steps(time, 0.3, 0.04, 0.2), steps(time, 2.2, 0.05, 0.2), steps(time, 4.2, 0.06, 0.2), 1.0 * (time > 3.0)]
+    commands = trim.command + np.column_stack(moves)
+    ours = simulator.rollout(theta, trim.initial, simulator.inputs(commands))
+    survey = survey_model(str(path), 16.0, -trim.initial[2])
+    flyer = JsbsimFlyer(survey, survey.files, kestrel, RATE)
+    states = np.asarray(ours.states)[:, :13]
+    begins = np.arange(len(time)) % 200 == 0
+    found = flyer.fly_short(begins, states, commands, np.zeros((len(time), 3)), RATE)
+    return states, np.asarray(ours.outputs), found, begins
+
+
+def share(theirs, ours):
+    """The largest difference of each signal as a share of its range."""
+    return np.abs(theirs - ours).max(axis=0) / np.ptp(ours, axis=0)
+
+
+def test_short_flights_are_those_of_our_simulator(flown):
+    """Rates, velocity, attitude and specific force within 2 % of their ranges.
+
+    JSBSim applies a frame's surfaces one frame (2.5 ms) later, integrates by lower orders, and turns with the earth.
+    """
+    states, outputs, found, _ = flown
+    assert np.isfinite(found.rates).all()
+    assert (share(found.rates, states[:, 10:13]) < 0.02).all()
+    assert (share(found.velocity, states[:, 3:6]) < 0.02).all()
+    attitude = np.column_stack(euler_angles(tuple(states[:, 6:10].T), np))
+    assert (share(found.attitude[:, :2], attitude[:, :2]) < 0.02).all()
+    assert (share(found.force, outputs[:, :3]) < 0.02).all()
+
+
+def test_short_flights_begin_in_the_given_state(flown):
+    states, _, found, begins = flown
+    assert found.velocity[begins] == pytest.approx(states[begins, 3:6], abs=0.02)
+    assert found.rates[begins] == pytest.approx(states[begins, 10:13], abs=0.005)
