@@ -42,13 +42,22 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
         metavar="NAME:KEY=VALUE",
         help="an effect to include, where the format can express it",
     )
+    parser.add_argument(
+        "--model",
+        dest="own_model",
+        metavar="FILE",
+        type=Path,
+        help="rosflight: your own parameters, into a copy of which the difference is written",
+    )
     parser.add_argument("--quiet", action="store_true", help="print nothing")
     return parser
 
 
 def run(args: argparse.Namespace) -> None:
     """Reads the estimate and writes the model."""
-    inputs = options.inputs_of([args.estimate], args.aircraft)
+    inputs = options.inputs_of(
+        [args.estimate, *([str(args.own_model)] if args.own_model is not None else [])], args.aircraft
+    )
     check_file(args.out, inputs, MARK, force=args.force)
     summary = _summary(args.estimate)
     if args.aircraft or not summary:
@@ -58,7 +67,7 @@ def run(args: argparse.Namespace) -> None:
     left: list[str] = []
     if summary:
         aircraft, left = with_estimates(aircraft, summary["derivatives"])
-    exported = _write(args.format, aircraft, args.effect)
+    exported = _into(args, aircraft) if args.own_model is not None else _write(args.format, aircraft, args.effect)
     write_file(args.out, exported.text)
     if not args.quiet:
         kept = f"; not valid, kept as in the aircraft file: {', '.join(left)}" if left else ""
@@ -112,6 +121,17 @@ def _summary(estimate: str) -> dict[str, Any] | None:
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         pass
     raise InputError(f"{path}: not the summary.json of a run (it needs aircraft and derivatives)")
+
+
+def _into(args: argparse.Namespace, aircraft: Aircraft) -> Exported:
+    """A copy of the user's own model with what the aircraft has other than it. Raises InputError."""
+    from sysid_node.sim.correcting.rosflight_model import corrected_parameters  # noqa: PLC0415  # JAX takes its time
+
+    if args.format != "rosflight":
+        raise InputError(f"--model: only rosflight's parameters are copied, not a model of {args.format}; leave it out")
+    if args.effect:
+        raise InputError("--model: give effects in the aircraft file, and not as --effect")
+    return corrected_parameters(args.own_model, aircraft)
 
 
 def _write(form: str, aircraft: Aircraft, specs: list[str]) -> Exported:

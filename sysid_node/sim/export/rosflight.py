@@ -31,10 +31,10 @@ from sysid_node.sim.importing.rosflight import NO_SERVO_LAG, rosflight_loads
 
 Array = NDArray[np.float64]
 
-_NAMES = {"CL": "C_L", "CD": "C_D", "CY": "C_Y", "Cl": "C_ell", "Cm": "C_m", "Cn": "C_n"}
+NAMES = {"CL": "C_L", "CD": "C_D", "CY": "C_Y", "Cl": "C_ell", "Cm": "C_m", "Cn": "C_n"}
 
 #: ROSflight's symbol and sign of each control.
-_CONTROLS = {"de": ("e", 1.0), "da": ("a", -1.0), "dr": ("r", 1.0)}
+CONTROLS = {"de": ("e", 1.0), "da": ("a", -1.0), "dr": ("r", 1.0)}
 _ANGLES = {"de": "max_elevator_deflection_angle", "da": "max_aileron_deflection_angle",
            "dr": "max_rudder_deflection_angle"}  # fmt: skip
 
@@ -71,13 +71,13 @@ _DIAMETER, _FULL_SPEED = 0.3, 1000.0
 #: Torque for each newton of thrust where the aircraft has none, m; and the motor's constant without back-EMF, V s/rad.
 _NO_TORQUE, _KQ = 1e-9, 1e-12
 
-_HELD = (
+HELD = (
     "actuator_lag", "actuator_bias", "stuck_surface", "control_effectiveness_loss", "cg_shift", "thrust_scale",
     "thrust_yaw", "lateral_asymmetry", "lateral_alpha_coupling", "drag_rise", "control_nonlinearity",
     "nonlinear_pitching_moment", "propwash",
 )  # fmt: skip
 
-_WHY = {
+WHY = {
     "command_delay": "rosflight_sim has no delay of commands",
     "actuator_rate_limit": "rosflight_sim's servos have none",
     "actuator_backlash": "rosflight_sim's servos have no free play",
@@ -92,19 +92,19 @@ _WHY = {
 
 def rosflight_parameters(aircraft: Aircraft, effects: Effects | None = None) -> Exported:
     """The YAML, and what it does not hold. Raises InputError for controls that ROSflight does not have."""
-    unsupported = [name for name, control in aircraft.controls.items() if control.symbol not in _CONTROLS]
+    unsupported = [name for name, control in aircraft.controls.items() if control.symbol not in CONTROLS]
     if unsupported:
         raise InputError(f"control {unsupported[0]!r}: rosflight_sim knows elevator, aileron and rudder only")
     aircraft, rest = folded(aircraft, effects or {})
     file = SteadyModel(aircraft, rest)
     form = _Form(file, rosflight_wing(file))
     text = _text(form, rest)
-    lines = [*_servo_lines(aircraft, rest), *_thrust_lines(aircraft, rest), *not_held(rest, _HELD, _WHY)]
+    lines = [*servo_lines(aircraft, rest), *thrust_lines(aircraft, rest), *not_held(rest, HELD, WHY)]
     lines += late_failures(rest)
     lines += [line + _AIRSPEED * line.startswith("V from") for line in differences(file, _read_back(text, form))]
     if form.wing.stalls:
         lines.insert(0, _STALL)
-    return Exported(text, tuple(lines), frozenset((*_HELD, *FOLDED, "stall_separation")))
+    return Exported(text, tuple(lines), frozenset((*HELD, *FOLDED, "stall_separation")))
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def _text(form: _Form, rest: Effects) -> str:
                             inertia=aircraft.inertia)]  # fmt: skip
     lines += ["/**:", "  ros__parameters:"]
     parameters = _airframe(form) | _servo(aircraft, rest) | _motor(aircraft, rest)
-    lines += [f"    {name}: {_number(value)}" for name, value in parameters.items()]
+    lines += [f"    {name}: {number_text(value)}" for name, value in parameters.items()]
     return "\n".join(lines) + "\n"
 
 
@@ -153,11 +153,11 @@ def _airframe(form: _Form) -> dict[str, float]:
     }
     if not wing.stalls:
         parameters |= {_ANGLES[c.symbol]: math.degrees(c.limit or 1.0) for c in aircraft.controls.values()}
-    for coefficient, name in _NAMES.items():
+    for coefficient, name in NAMES.items():
         parameters[f"{name}_O"] = d.get(f"{coefficient}_0", 0.0)
         for regressor in ("alpha", "beta", "p", "q", "r"):
             parameters[f"{name}_{regressor}"] = d.get(f"{coefficient}_{regressor}", 0.0)
-        for symbol, (letter, sign) in _CONTROLS.items():
+        for symbol, (letter, sign) in CONTROLS.items():
             unit = form.units.get(symbol, 0.0)
             parameters[f"{name}_delta_{letter}"] = sign * unit * d.get(f"{coefficient}_{symbol}", 0.0)
     return parameters | {"C_D_p": wing.parasitic, "C_L_O": wing.CL0, "C_L_alpha": wing.CLa}
@@ -165,19 +165,20 @@ def _airframe(form: _Form) -> dict[str, float]:
 
 def _servo(aircraft: Aircraft, rest: Effects) -> dict[str, float]:
     """The one lag of elevator and aileron: the mean of theirs."""
-    lags = _lags(aircraft, rest)
+    lags = servo_lags(aircraft, rest)
     mean = sum(lags.values()) / len(lags) if lags else 0.0
     return {"servo_tau": mean or NO_SERVO_LAG}
 
 
-def _lags(aircraft: Aircraft, rest: Effects) -> dict[str, float]:
+def servo_lags(aircraft: Aircraft, rest: Effects) -> dict[str, float]:
     """Lags (s) of elevator and aileron, by control."""
     lags = first_order_lags(rest)
     return {c.name: lags.get(c.name, 0.0) for c in aircraft.controls.values() if c.symbol in ("de", "da")}
 
 
-def _servo_lines(aircraft: Aircraft, rest: Effects) -> list[str]:
-    lines, lags = second_order_line(rest), _lags(aircraft, rest)
+def servo_lines(aircraft: Aircraft, rest: Effects) -> list[str]:
+    """What rosflight_sim does not hold of the servos, a line each."""
+    lines, lags = second_order_line(rest), servo_lags(aircraft, rest)
     if lags and max(lags.values()) - min(lags.values()) > 1e-9:
         told = ", ".join(f"{name} {lag:g} s" for name, lag in lags.items())
         lines.append(
@@ -218,7 +219,8 @@ def _motor(aircraft: Aircraft, rest: Effects) -> dict[str, float]:
     }
 
 
-def _thrust_lines(aircraft: Aircraft, rest: Effects) -> list[str]:
+def thrust_lines(aircraft: Aircraft, rest: Effects, *, arms: bool = True) -> list[str]:
+    """What rosflight_sim does not hold of the thrust, a line each; ``arms``: also of the file's own line of it."""
     throttle, values = aircraft.throttle, rest.get("thrust_yaw", {})
     if throttle is None:
         return []
@@ -226,8 +228,8 @@ def _thrust_lines(aircraft: Aircraft, rest: Effects) -> list[str]:
     if throttle.max_thrust is None:
         lines.append("thrust: the file states no largest thrust; keep your own motor and propeller")
     sizes = {
-        "inclination": (throttle.inclination, "rad"),
-        "arm": (throttle.arm, "m"),
+        "inclination": (throttle.inclination * arms, "rad"),
+        "arm": (throttle.arm * arms, "m"),
         "thrust_yaw arm": (values.get("arm", 0.0), "m"),
         "thrust_yaw p_factor": (values.get("p_factor", 0.0), "m/rad"),
         "thrust_yaw torque_arm": (max(values.get("torque_arm", 0.0), 0.0), "m"),
@@ -254,14 +256,14 @@ def _read_back(text: str, form: _Form) -> Coefficients:
         half = 2.0 * x["V"]
         rates = (x["p"] * half / g.b, x["q"] * half / g.cbar, x["r"] * half / g.b)
         zero = np.zeros_like(x["V"])
-        controls = {symbol: x[symbol] / units[symbol] if symbol in units else zero for symbol in _CONTROLS}
+        controls = {symbol: x[symbol] / units[symbol] if symbol in units else zero for symbol in CONTROLS}
         states = PlantStates(x["V"], x["alpha"], x["beta"], *rates, controls, zero)
         return nondimensional(loads(states), density, states, g)
 
     return coefficients
 
 
-def _number(value: float) -> str:
+def number_text(value: float) -> str:
     """A YAML float; ROS would take 1 for an integer and refuse it, and YAML 1.1 takes 1e-12 for text."""
     text = f"{0.0 if abs(value) < 1e-15 else finite(value):.12g}"
     digits, exponent, power = text.partition("e")

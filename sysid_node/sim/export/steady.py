@@ -52,6 +52,7 @@ class SteadyModel:
 
     aircraft: Aircraft
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    flight: Mapping[str, float] | None = None  # the level flight, where it is not to be this aircraft's own
 
     @cached_property
     def _simulator(self) -> Simulator:
@@ -76,6 +77,8 @@ class SteadyModel:
     @cached_property
     def level(self) -> dict[str, float]:
         """Level flight at the reference condition: rad, m/s, throttle 0..1; zero where it is not named."""
+        if self.flight is not None:
+            return dict(self.flight)
         still = dict.fromkeys((*self.regressors, "throttle"), 0.0) | {"V": self.aircraft.reference.airspeed}
         still["alpha"] = reference_flight(self.aircraft)[1]
         if self.plain:

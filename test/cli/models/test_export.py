@@ -85,6 +85,8 @@ def test_a_corrected_file_is_exported_with_its_effects(tmp_path, capsys, form):
             ["{run}/summary.json", "--format", "gazebo", "--effect", "actuator_backlash:elevator=0.02"],
             "'actuator_backlash' cannot be exported to gazebo: Gazebo's joint controllers have no free play",
         ),
+        (["kestrel", "--format", "gazebo", "--model", "{run}/own.yaml"], "only rosflight's parameters are copied"),
+        (["kestrel", "--format", "rosflight", "--model", "{run}/own.yaml"], "not parameters of rosflight_sim"),
         (["{run}/broken.json", "--format", "gazebo"], "not the summary.json of a run"),
         (["cdrw", "--format", "jsbsim", "--out", "{run}/none/model.xml"], "cannot be written"),
         (["{run}", "--format", "jsbsim", "--out", "{run}/summary.json"], "holds something else; give --force"),
