@@ -47,7 +47,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
         dest="own_model",
         metavar="FILE",
         type=Path,
-        help="rosflight: your own parameters, into a copy of which the difference is written",
+        help="gazebo, rosflight: your own model, into a copy of which the difference is written",
     )
     parser.add_argument("--quiet", action="store_true", help="print nothing")
     return parser
@@ -125,13 +125,15 @@ def _summary(estimate: str) -> dict[str, Any] | None:
 
 def _into(args: argparse.Namespace, aircraft: Aircraft) -> Exported:
     """A copy of the user's own model with what the aircraft has other than it. Raises InputError."""
-    from sysid_node.sim.correcting.rosflight_model import corrected_parameters  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim.correcting.gazebo_model import corrected_sdf  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim.correcting.rosflight_model import corrected_parameters  # noqa: PLC0415
 
-    if args.format != "rosflight":
-        raise InputError(f"--model: only rosflight's parameters are copied, not a model of {args.format}; leave it out")
+    if args.format == "jsbsim":
+        raise InputError("--model: a JSBSim model is corrected by sysid gap --simulator jsbsim:FILE; leave it out here")
     if args.effect:
         raise InputError("--model: give effects in the aircraft file, and not as --effect")
-    return corrected_parameters(args.own_model, aircraft)
+    write = {"gazebo": corrected_sdf, "rosflight": corrected_parameters}[args.format]
+    return write(args.own_model, aircraft)
 
 
 def _write(form: str, aircraft: Aircraft, specs: list[str]) -> Exported:

@@ -24,8 +24,13 @@ def read_document(path: Path) -> tuple[str, Element]:
 
 def write_document(path: Path, prolog: str, root: Element) -> None:
     """Write the file in UTF-8."""
+    path.write_text(document_text(prolog, root), encoding="utf-8")
+
+
+def document_text(prolog: str, root: Element) -> str:
+    """The text of a document, to be stored in UTF-8."""
     declared = re.sub(r"(<\?xml[^>]*?)\s+encoding=[\"'][^\"']*[\"']", r"\1", prolog)
-    path.write_text(declared + ElementTree.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
+    return declared + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
 def text_element(parent: Element, tag: str, text: str | float, **attributes: str) -> Element:

@@ -254,6 +254,17 @@ def test_masses_servos_and_signs(tmp_path):
     assert aircraft.ideal
 
 
+def test_a_glider_without_joints_has_no_controls(tmp_path):
+    path = tmp_path / "glider.sdf"
+    path.write_text(
+        "<sdf><model name='m'><link name='l'><inertial><mass>1</mass></inertial></link>"
+        "<plugin name='x::LiftDrag'><link_name>l</link_name></plugin></model></sdf>"
+    )
+    aircraft = read_gazebo(path).aircraft
+    assert not aircraft.controls
+    assert aircraft.derivatives["CL_alpha"].value == pytest.approx(1.0, rel=0.01)  # the plugin's default cla
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -32,7 +32,7 @@ from sysid_node.sim.importing.plant import PlantStates, nondimensional
 Array = NDArray[np.float64]
 
 #: The plugin's name of each coefficient.
-_NAMES = {"CL": "CL", "CD": "CD", "CY": "CY", "Cl": "Cell", "Cm": "Cem", "Cn": "Cen"}
+NAMES = {"CL": "CL", "CD": "CD", "CY": "CY", "Cl": "Cell", "Cm": "Cem", "Cn": "Cen"}
 
 _RATES = ("p", "q", "r")
 
@@ -46,13 +46,13 @@ _NOTE = (
 _CORRECTIONS = 3
 
 #: Effects that the model holds; those in steady flight as far as ``differences`` does not say otherwise.
-_HELD = (
+HELD = (
     "actuator_lag", "actuator_rate_limit", "actuator_bias", "stuck_surface", "control_effectiveness_loss", "motor_lag",
     "cg_shift", "thrust_scale", "thrust_yaw", "lateral_asymmetry", "lateral_alpha_coupling", "drag_rise",
     "control_nonlinearity", "nonlinear_pitching_moment", "propwash",
 )  # fmt: skip
 
-_WHY = {
+WHY = {
     "command_delay": "Gazebo's joints and motors have no delay",
     "actuator_backlash": "Gazebo's joint controllers have no free play",
     "unsteady_aerodynamics": "the plugin has no terms in the rate of alpha",
@@ -70,14 +70,14 @@ def gazebo_model(aircraft: Aircraft, effects: Effects | None = None) -> Exported
     inner = SteadyModel(aircraft, {name: values for name, values in rest.items() if name != "cg_shift"})
     plugin = _plugin_of(inner)
     text = _document(inner, rest, plugin)
-    written = _read_back(text, aircraft)
+    written = read_back(text, aircraft)
     for _ in range(_CORRECTIONS if not file.plain else 0):
         plugin = _corrected(plugin, file, written)
         text = _document(inner, rest, plugin)
-        written = _read_back(text, aircraft)
-    lines = [*parts_left_out(aircraft, rest), *not_held(rest, _HELD, _WHY), *late_failures(rest)]
+        written = read_back(text, aircraft)
+    lines = [*parts_left_out(aircraft, rest), *not_held(rest, HELD, WHY), *late_failures(rest)]
     lines += _offsets(inner) + differences(file, written)
-    return Exported(text, tuple(_explained(line) for line in lines), frozenset((*_HELD, *FOLDED, "stall_separation")))
+    return Exported(text, tuple(explained(line) for line in lines), frozenset((*HELD, *FOLDED, "stall_separation")))
 
 
 @dataclass(frozen=True)
@@ -104,15 +104,15 @@ def _corrected(plugin: _Plugin, file: SteadyModel, written: Coefficients) -> _Pl
     slopes, numbers = dict(plugin.slopes), plugin.numbers
     for name in file.regressors:
         change = file.slope(file, name) - file.slope(written, name)
-        for coefficient, value in zip(_NAMES, change.tolist(), strict=True):
+        for coefficient, value in zip(NAMES, change.tolist(), strict=True):
             if not (coefficient == "CD" and name in ("alpha", "beta")):
                 slopes[f"{coefficient}_{name}"] = slopes.get(f"{coefficient}_{name}", 0.0) + value
     if not file.bent:
         numbers = replace(numbers, CLa=slopes["CL_alpha"], Cema=slopes["Cm_alpha"])
     # the changes of slopes change level flight, too
     moved = {c: sum((slopes.get(f"{c}_{n}", 0.0) - plugin.slopes.get(f"{c}_{n}", 0.0)) * file.level[n]
-                    for n in file.regressors if n != "alpha" or not file.bent) for c in _NAMES}  # fmt: skip
-    missing = dict(zip(_NAMES, (file.here(file) - file.here(written)).tolist(), strict=True))
+                    for n in file.regressors if n != "alpha" or not file.bent) for c in NAMES}  # fmt: skip
+    missing = dict(zip(NAMES, (file.here(file) - file.here(written)).tolist(), strict=True))
     moved["CD"] = sum((slopes.get(f"CD_{n}", 0.0) - plugin.slopes.get(f"CD_{n}", 0.0)) * file.level[n]
                       for n in file.regressors if n != "alpha")  # fmt: skip
     numbers = replace(
@@ -124,7 +124,8 @@ def _corrected(plugin: _Plugin, file: SteadyModel, written: Coefficients) -> _Pl
     return _Plugin(numbers, slopes)
 
 
-def _explained(line: str) -> str:
+def explained(line: str) -> str:
+    """A line with the reason of what it says."""
     if line.startswith("beta from"):
         return f"{line} (the plugin's pressure is that of the airspeed in the plane of symmetry)"
     return line
@@ -178,7 +179,7 @@ def _stability(plugin: _Plugin) -> dict[str, float]:
     """Stability derivatives by the plugin's names; the drag due to alpha is in the parabola."""
     numbers = plugin.numbers
     entries = {"CL0": numbers.CL0, "Cem0": numbers.Cem0}
-    for coefficient, name in _NAMES.items():
+    for coefficient, name in NAMES.items():
         for regressor, suffix in {"alpha": "a", "beta": "b", **{rate: rate for rate in _RATES}}.items():
             if coefficient == "CD" and regressor in ("alpha", "beta"):
                 continue
@@ -191,8 +192,8 @@ def _surfaces(aircraft: Aircraft, slopes: Mapping[str, float]) -> dict[str, dict
     surfaces: dict[str, dict[str, float]] = {}
     for control in aircraft.controls.values():
         for joint, scale in control.joints.items():
-            entries = surfaces.setdefault(joint, {f"{name}_ctrl": 0.0 for name in _NAMES.values()})
-            for coefficient, name in _NAMES.items():
+            entries = surfaces.setdefault(joint, {f"{name}_ctrl": 0.0 for name in NAMES.values()})
+            for coefficient, name in NAMES.items():
                 entries[f"{name}_ctrl"] += (
                     math.radians(1.0) * scale * slopes.get(f"{coefficient}_{control.symbol}", 0.0)
                 )
@@ -206,7 +207,7 @@ def _offsets(file: SteadyModel) -> list[str]:
     return [f"{', '.join(lost)}: the plugin has no offsets of side force, roll and yaw"] if lost else []
 
 
-def _read_back(text: str, aircraft: Aircraft) -> Coefficients:
+def read_back(text: str, aircraft: Aircraft) -> Coefficients:
     """The coefficients of the written model about its centre of gravity, by the equations of the plugin."""
     with tempfile.TemporaryDirectory(prefix="sysid-") as folder:
         path = Path(folder) / "model.sdf"

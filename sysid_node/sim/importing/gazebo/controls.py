@@ -50,6 +50,8 @@ def controls_of(power: Mapping[str, Array], limits: Mapping[str, float]) -> dict
 def joint_angles(controls: Mapping[str, Control], deflections: Mapping[str, Array]) -> dict[str, Array]:
     """Angles of the joints (rad) at deflections of the controls, by symbol: the inverse of the controls."""
     joints = sorted({joint for control in controls.values() for joint in control.joints})
+    if not joints:
+        return {}
     matrix = np.array([[control.joints.get(joint, 0.0) for joint in joints] for control in controls.values()])
     values = np.array([deflections[control.symbol] for control in controls.values()])
     return dict(zip(joints, np.linalg.solve(matrix, values), strict=True))
