@@ -21,8 +21,8 @@ from sysid_node.sim.importing.jsbsim.survey import ModelSurvey
 
 Array = NDArray[np.float64]
 
-#: JSBSim's frames for each sample, at least so many a second: below 400 Hz its answers drift.
-_RATE = 400.0
+#: JSBSim's frames a second, at least: below 400 Hz its answers drift.
+FRAME_RATE = 400.0
 
 #: How long before a short flight the flight control system follows the commands, s: longer than lags and delays last.
 _WARM_UP = 1.0
@@ -68,11 +68,19 @@ class JsbsimFlyer:
     """One JSBSim model that flies short flights of an aircraft file's commands.
 
     ``survey`` is that of the model as it was: it says which command gives which deflection. A control whose position
-    depends on the motion is held at its recorded position. Raises InputError where JSBSim does not load the model.
+    depends on the motion is held at its recorded position. JSBSim runs ``frame_rate`` frames a second, or one a sample.
+    Raises InputError where JSBSim does not load the model.
     """
 
-    def __init__(self, survey: ModelSurvey, files: ModelFiles, aircraft: Aircraft, rate: float) -> None:
-        self._frames = max(round(_RATE / rate), 1)
+    def __init__(
+        self,
+        survey: ModelSurvey,
+        files: ModelFiles,
+        aircraft: Aircraft,
+        rate: float,
+        frame_rate: float = FRAME_RATE,
+    ) -> None:
+        self._frames = max(round(frame_rate / rate), 1)
         self._survey, self._names = survey, tuple(aircraft.controls)
         self._surfaces = {surface.name: surface for surface in survey.surfaces}
         held = {name for s in survey.surfaces if s.feedback for name in s.properties}

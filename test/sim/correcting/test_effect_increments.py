@@ -34,7 +34,8 @@ class Flown:
                                     *(fdm[f"moments/{a}-prop-lbsft"] * POUND * FOOT for a in "lmn")])  # fmt: skip
         self.lift = fdm["forces/fwz-aero-lbs"] * POUND / self.pressure
         self.alpha_rate = fdm["aero/alphadot-rad_sec"] * file.geometry.cbar / (2.0 * self.state.airspeed)
-        self.late = self.state.alpha - reference_flight(file)[1]
+        self.level, alpha = reference_flight(file)
+        self.late = self.state.alpha - alpha
 
 
 def assert_adds(survey, file, effects, folder, expected):
@@ -99,9 +100,8 @@ AERODYNAMICS = {
 
 
 @pytest.mark.parametrize("effect", AERODYNAMICS)
-def test_aerodynamics(survey, file, tmp_path, effect, monkeypatch):
+def test_aerodynamics(survey, file, tmp_path, effect):
     """Terms in alpha from level flight, the model's own lift, deflections cubed, and JSBSim's rate of alpha."""
-    monkeypatch.setattr(Flown, "level", reference_flight(file)[0], raising=False)
     values, expected = AERODYNAMICS[effect]
     assert_adds(survey, file, {effect: values}, tmp_path, expected)
 

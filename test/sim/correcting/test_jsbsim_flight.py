@@ -12,7 +12,6 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Sensors
 from sysid_node.dynamics.attitude import euler_angles
 from sysid_node.sim import Simulator, trim_flight
-from sysid_node.sim.correcting import jsbsim_flight
 from sysid_node.sim.correcting.jsbsim_flight import JsbsimFlyer
 from sysid_node.sim.export.jsbsim import jsbsim_model
 from sysid_node.sim.importing.jsbsim.survey import survey_model
@@ -29,8 +28,6 @@ FRAMES = {400.0: 0.02, 6400.0: 0.01}
 @pytest.fixture(scope="module", params=FRAMES)
 def flown(request, tmp_path_factory):
     """States, specific forces and those of JSBSim: steps on all surfaces, begun from trim and anew every 2 s."""
-    patch = pytest.MonkeyPatch()
-    patch.setattr(jsbsim_flight, "_RATE", request.param)
     kestrel = replace(load_aircraft("kestrel"), sensors=Sensors())
     path = tmp_path_factory.mktemp("flyer") / "kestrel.xml"
     path.write_text(jsbsim_model(kestrel, EFFECTS))
@@ -42,11 +39,10 @@ def flown(request, tmp_path_factory):
     commands = trim.command + np.column_stack(moves)
     ours = simulator.rollout(theta, trim.initial, simulator.inputs(commands))
     survey = survey_model(str(path), 16.0, -trim.initial[2])
-    flyer = JsbsimFlyer(survey, survey.files, kestrel, RATE)
+    flyer = JsbsimFlyer(survey, survey.files, kestrel, RATE, request.param)
     states = np.asarray(ours.states)[:, :13]
     begins = np.arange(len(time)) % 200 == 0
     found = flyer.fly_short(begins, states, commands, np.zeros((len(time), 3)), RATE)
-    patch.undo()
     return states, np.asarray(ours.outputs), found, begins, FRAMES[request.param]
 
 

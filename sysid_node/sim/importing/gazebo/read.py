@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from sysid_node.errors import InputError
 from sysid_node.sim.importing.gazebo.advanced_lift_drag import AdvancedLiftDrag
 from sysid_node.sim.importing.gazebo.controls import controls_of, joint_angles
 from sysid_node.sim.importing.gazebo.lift_drag import LiftDrag
+from sysid_node.sim.importing.gazebo.motion import motor_effects, servo_effects
 from sysid_node.sim.importing.gazebo.sdf import SdfModel, masses, number_in, read_sdf
 from sysid_node.sim.importing.imported import Imported
 from sysid_node.sim.importing.plant import Plant, PlantEngine, PlantStates, aircraft_of, nondimensional
@@ -26,9 +26,6 @@ Array = NDArray[np.float64]
 _TURN = np.array([1.0, -1.0, -1.0])
 
 _ALPHA = np.deg2rad(np.arange(-16.0, 24.01, 1.0))
-#: A joint controller's largest command where none is stated.
-_NO_COMMAND_LIMIT = 1000.0
-
 _BETA = np.deg2rad([-15.0, -10.0, -5.0, 0.0, 5.0, 10.0, 15.0])
 
 
@@ -88,7 +85,7 @@ def _plant(model: SdfModel, file: str) -> tuple[Plant, _Loads, tuple[bool, bool]
         air=loads.air,
         engine=PlantEngine(loads.engine, loads.rotor.joint, loads.rotor.full_thrust) if loads.rotor else None,
         nodes=_nodes(simple, advanced),
-        effects=_effects(model, controls, loads.rotor),
+        effects=servo_effects(model, controls) | (motor_effects(loads.rotor.constants) if loads.rotor else {}),
     )
     return plant, loads, (bool(simple), bool(advanced))
 
@@ -211,53 +208,6 @@ def _limits(model: SdfModel, joints: Sequence[str]) -> dict[str, float]:
         if known:
             limits[joint] = min(known)
     return limits
-
-
-def _effects(model: SdfModel, controls: Mapping[str, Control], rotor: Rotor | None) -> dict[str, dict[str, float]]:
-    """Servos and motor: a position controller against a joint's damping is a lag of damping over gain."""
-    lag, rate = {}, {}
-    servos = {(p.findtext("joint_name") or "").strip(): p for p in model.plugins_named("JointPositionController")}
-    for name, control in controls.items():
-        driven = {joint: servos[joint] for joint in control.joints if joint in servos}
-        times = [_servo_lag(model, joint, servo) for joint, servo in driven.items()]
-        if times and max(times) > 0.0:
-            lag[name] = sum(times) / len(times)
-        rates = [abs(control.joints[joint]) * _servo_rate(model, joint, servo) for joint, servo in driven.items()]
-        if rates and math.isfinite(sum(rates)):
-            rate[name] = sum(rates)
-    effects = {name: values for name, values in (("actuator_lag", lag), ("actuator_rate_limit", rate)) if values}
-    if rotor is not None:
-        up, down = rotor.constants["timeConstantUp"], rotor.constants["timeConstantDown"]
-        if up + down > 0.0:
-            effects["motor_lag"] = {"time_constant": 0.5 * (up + down)}
-    return effects
-
-
-def _servo_lag(model: SdfModel, joint: str, controller: Element) -> float:
-    """Time constant (s) of P (command - angle) - D rate = (damping) rate; the surfaces' inertia is neglected."""
-    gain, rate_gain = (
-        number_in(controller, tag, value, model.file) for tag, value in (("p_gain", 1.0), ("d_gain", 0.1))
-    )
-    if _follows_at_once(controller):
-        return 0.0
-    damping = model.joint_number(joint, "axis/dynamics/damping") or 0.0
-    return (damping + (rate_gain if controller.find("d_gain") is not None else 0.0)) / gain if gain > 0.0 else 0.0
-
-
-def _servo_rate(model: SdfModel, joint: str, controller: Element) -> float:
-    """The joint's largest rate (rad/s): its largest command, or what this gives against the joint's damping."""
-    most = number_in(controller, "cmd_max", _NO_COMMAND_LIMIT, model.file)
-    if most >= _NO_COMMAND_LIMIT:
-        return math.inf
-    damping = model.joint_number(joint, "axis/dynamics/damping") or 0.0
-    if _follows_at_once(controller):
-        return most
-    return most / damping if damping > 0.0 else math.inf
-
-
-def _follows_at_once(controller: Element) -> bool:
-    """Whether the joint moves to its command without a control loop."""
-    return (controller.findtext("use_velocity_commands") or "").strip().lower() in ("true", "1")
 
 
 def _rotor(model: SdfModel, centre: Array) -> Rotor | None:
