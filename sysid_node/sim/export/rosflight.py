@@ -23,7 +23,7 @@ from sysid_node.sim.export.cells import finite, plain
 from sysid_node.sim.export.exported import Exported
 from sysid_node.sim.export.folding import FOLDED, Effects, folded, thrust_factor
 from sysid_node.sim.export.losses import differences, late_failures, not_held
-from sysid_node.sim.export.rosflight_fit import RosflightWing, rosflight_wing
+from sysid_node.sim.export.rosflight_fit import RosflightWing, drag_slope, rosflight_wing
 from sysid_node.sim.export.servos import first_order_lags, second_order_line
 from sysid_node.sim.export.steady import Coefficients, Columns, SteadyModel
 from sysid_node.sim.importing.plant import PlantStates, nondimensional
@@ -160,6 +160,8 @@ def _airframe(form: _Form) -> dict[str, float]:
         for symbol, (letter, sign) in CONTROLS.items():
             unit = form.units.get(symbol, 0.0)
             parameters[f"{name}_delta_{letter}"] = sign * unit * d.get(f"{coefficient}_{symbol}", 0.0)
+    elevator = form.units.get("de", 0.0) * drag_slope(form.file, "de") if "de" in form.units else 0.0
+    parameters |= {"C_D_q": drag_slope(form.file, "q"), "C_D_delta_e": elevator}
     return parameters | {"C_D_p": wing.parasitic, "C_L_O": wing.CL0, "C_L_alpha": wing.CLa}
 
 

@@ -48,8 +48,15 @@ def rosflight_wing(file: SteadyModel) -> RosflightWing:
             stalls = True
     geometry = file.aircraft.geometry
     induced = (CL0 + CLa * level) ** 2 / (3.14159 * EFFICIENCY * geometry.b**2 / geometry.S)
-    others = sum(d.get(f"CD_{name}", 0.0) * file.level[name] for name in file.regressors if name in ("q", "de"))
+    others = sum(drag_slope(file, name) * file.level[name] for name in file.regressors if name in ("q", "de"))
     return RosflightWing(CL0, CLa, float(file.here(file)[1]) - induced - others, stalls, M, alpha0)
+
+
+def drag_slope(file: SteadyModel, name: str) -> float:
+    """The slope of CD over elevator or pitch rate in level flight; only the wing's lift has induced drag there."""
+    d = file.derivatives
+    induced = 2.0 * d.get("CD_k", 0.0) * float(file.here(file)[0]) * d.get(f"CL_{name}", 0.0)
+    return d.get(f"CD_{name}", 0.0) + induced
 
 
 def _lift(alpha: float, CL0: float, CLa: float, M: float, alpha0: float) -> float:

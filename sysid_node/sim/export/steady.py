@@ -19,6 +19,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.dynamics.airflow import stability_axes, velocity_of
 from sysid_node.dynamics.forces import coefficients_of
+from sysid_node.dynamics.linear_model import level_flight
 from sysid_node.dynamics.vector import Vector
 from sysid_node.errors import InputError
 from sysid_node.sim.effects import EFFECTS, cg_shift, stall_separation
@@ -45,6 +46,10 @@ _STEP_OF_CONTROLS = 0.05
 #: Stations whose effects are in the coefficients.
 _STATIONS = ("actuator", "aerodynamics", "propulsion", "mass")
 
+#: Effects of these stations that do nothing in steady flight far above the ground.
+_NOT_STEADY = ("actuator_lag", "actuator_rate_limit", "actuator_backlash", "motor_lag", "unsteady_aerodynamics",
+               "ground_effect")  # fmt: skip
+
 
 @dataclass(frozen=True)
 class SteadyModel:
@@ -62,7 +67,7 @@ class SteadyModel:
     def acting(self) -> dict[str, Mapping[str, float]]:
         """The effects that change coefficients in steady flight."""
         return {name: values for name, values in self.effects.items()
-                if EFFECTS[name].station in _STATIONS and name != "ground_effect"}  # fmt: skip
+                if EFFECTS[name].station in _STATIONS and name not in _NOT_STEADY}  # fmt: skip
 
     @property
     def plain(self) -> bool:
@@ -80,7 +85,9 @@ class SteadyModel:
         if self.flight is not None:
             return dict(self.flight)
         still = dict.fromkeys((*self.regressors, "throttle"), 0.0) | {"V": self.aircraft.reference.airspeed}
-        still["alpha"] = reference_flight(self.aircraft)[1]
+        values = {name: d.value for name, d in self.aircraft.derivatives.items()}
+        still["alpha"], elevator = level_flight(values, reference_flight(self.aircraft)[0], speed_ratio=1.0)
+        still |= {"de": elevator} if "de" in still else {}
         if self.plain:
             return still
         try:

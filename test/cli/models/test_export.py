@@ -149,3 +149,12 @@ def test_a_value_that_is_not_finite_is_refused(writer, value):
     derivatives = {**aircraft.derivatives, "CL_q": Derivative(value)}
     with pytest.raises(InputError, match="correct the estimate"):
         writer(replace(aircraft, derivatives=derivatives))
+
+
+@pytest.mark.parametrize("name", ["kestrel", "cdrw", "cdfp"])
+@pytest.mark.parametrize("writer", [gazebo_model, rosflight_parameters])
+def test_level_flight_and_its_slopes_are_the_files(writer, name):
+    """All that is left out of our own aircraft is the drag's form, and in Gazebo the pressure in sideslip."""
+    lines = writer(load_aircraft(name)).left_out
+    assert not [line for line in lines if not line.startswith(("alpha from", "beta from", "de from"))]
+    assert all("CD by" in line for line in lines)

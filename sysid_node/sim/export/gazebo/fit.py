@@ -66,6 +66,8 @@ def _polar(file: SteadyModel) -> ParabolicPolar:
     if file.plain:
         polar = polar_of(file.aircraft)
         added = file.derivatives["CD_0"] - _value(file, "CD_0")  # what the drag has by airspeed
+        # the elevator's slope has lost the part that the parabola has; in level flight it is given back here
+        added += 2.0 * polar.fitted * polar.lift * file.derivatives.get("CL_de", 0.0) * file.level.get("de", 0.0)
         return ParabolicPolar(polar.zero + added, polar.own, polar.fitted, polar.lift, polar.alpha)
     d = file.derivatives
     lift, drag = file.here(file)[:2]
