@@ -39,9 +39,10 @@ def cut_to_manoeuvre(flight: GapFlight, controls: tuple[str, ...]) -> GapFlight:
     first, last = np.searchsorted(power / power[-1], [aside, 1.0 - aside]) / ANALYSIS_RATE
     end = min(max(last + limits.after, first - limits.before + SHORTEST_FLIGHT), record.duration)
     begin = max(min(first - limits.before, end - SHORTEST_FLIGHT), 0.0)
+    if end - begin > limits.share_of_flight * record.duration:
+        return flight
     kept = (record.time >= begin) & (record.time <= end)
-    elsewhere = commands[~kept].var(axis=0) > limits.elsewhere * commands[kept].var(axis=0)
-    if end - begin > limits.share_of_flight * record.duration or elsewhere.any():
+    if (commands[~kept].var(axis=0) > limits.elsewhere * commands[kept].var(axis=0)).any():
         return flight
     return replace(flight, record=_between(flight.record, begin, end), left_out=flight.record.duration - (end - begin))
 

@@ -28,6 +28,11 @@ def test_a_manoeuvre_at_the_end_keeps_enough_before_it(aircraft) -> None:
     assert abs(cut.record["de"]).max() == abs(flight.record["de"]).max()
 
 
+def test_a_flight_of_the_shortest_length_is_kept(aircraft) -> None:
+    flight = fly(aircraft, {}, manoeuvre=["doublet:elevator:start=4:width=0.3"], duration=6.2)
+    assert cut_to_manoeuvre(flight, CONTROLS) is flight
+
+
 def test_manoeuvres_all_over_a_flight_are_kept(aircraft) -> None:
     steps = ["3211:elevator:start=2", "3211:aileron:start=20", "3211:rudder:start=40"]
     flight = fly(aircraft, {}, manoeuvre=steps, duration=50.0)
