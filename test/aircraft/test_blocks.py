@@ -253,7 +253,11 @@ def test_the_documentation_states_every_default_and_its_blocks_load():
         assert f"`{default.pattern}`" in page or default.pattern == "*"
     text = GOOD[: GOOD.index("effects:")] + GOOD[GOOD.index("derivatives:\n  CL") :]
     text = text.replace("flap: {joint: flap, symbol: df}", "rudder: {joint: rudder}")
-    effects, tables = page.split("```yaml\n")[2:4]
-    aircraft = parse_aircraft(text + effects.split("```")[0] + tables.split("```")[0])
+    tolerances, effects, tables = (block.split("```")[0] for block in page.split("```yaml\n")[2:5])
+    aircraft = parse_aircraft(text + effects + tables)
     assert len(aircraft.effects) == 5
     assert len(aircraft.tables) == 2
+    other = [line for line in text.splitlines() if not line.startswith(("reference:", "delays:", "noise:"))]
+    stated = parse_aircraft("\n".join([*other, tolerances]))
+    assert stated.tolerances["air_density"] == pytest.approx(0.005)
+    assert set(stated.effects) >= {"airspeed_scale", "imu_misalignment", "cg_shift"}
