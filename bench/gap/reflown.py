@@ -6,7 +6,8 @@ model (``sysid import``, ``--simulator``) or by flights recorded in it (``--simu
 JSBSim stands beside what the true effect closes there.
 
 A case is added to the ledger as it ends; started again, the bench goes on with the next seed. Each line holds a digest
-of the sources that decide, and a ledger holds one digest only. ``--page FILE`` puts the tables into a page.
+of the sources that decide, and a case is added only to cases of the present sources. ``--page FILE`` puts the tables
+into a page.
 """
 
 from __future__ import annotations

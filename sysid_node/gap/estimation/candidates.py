@@ -78,6 +78,7 @@ class Candidate:
     starts: tuple[tuple[float, ...], ...]
     widened: tuple[int, ...] = ()  # nuisances whose priors are widened
     choices: int = 1  # from how many of its kind it is, each as probable before the flight
+    law: str = ""  # where the effect's equation is another one than its other candidates have: "second order"
 
     @property
     def entries(self) -> tuple[int, ...]:
@@ -92,7 +93,7 @@ class Candidate:
     @property
     def scope(self) -> str:
         """The control, coefficient or derivative on which it acts alone; empty where it acts on all."""
-        return "" if self.label == SECOND_ORDER else self.label.partition(" of ")[2]
+        return "" if self.law else self.label.partition(" of ")[2]
 
     @property
     def station(self) -> str:
@@ -212,7 +213,7 @@ def _second_order(simulator: Simulator) -> Iterator[Candidate]:
     lag, damping = (names.index(f"actuator_lag.{name}") for name in ("time_constant", "damping"))
     if neutral[damping] == 0.0:
         starts = tuple((float(neutral[lag]) + more, 0.7) for more in (0.01, 0.03, 0.07))
-        yield Candidate("actuator_lag", SECOND_ORDER, (lag, damping), starts)
+        yield Candidate("actuator_lag", SECOND_ORDER, (lag, damping), starts, law="second order")
 
 
 def _per_coefficient(simulator: Simulator, *, lateral: bool) -> list[Candidate]:

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SECOND_ORDER, SHARED, TIME_EFFECTS, Candidate
+from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, TIME_EFFECTS, Candidate
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor_of_alternatives
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison
@@ -171,9 +171,9 @@ def _suffices(fitted: FittedSet, more: Candidate, less: Candidate) -> bool:
     """Whether sizes fitted with the variant ``more`` of an effect are those that the simpler variant ``less`` can have.
 
     One size for all controls suffices where all are the same, one control's where those of the others are the file's.
-    Sizes do not tell a lag of second order from one of first.
+    Sizes do not tell one law from another.
     """
-    if SECOND_ORDER in (more.label, less.label):
+    if more.law != less.law:
         return False
     fit, point = fitted.fit, fitted.fit.flights[0].point
     every = [

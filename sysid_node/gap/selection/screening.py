@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
-from sysid_node.gap.estimation.candidates import PER_CONTROL, SECOND_ORDER, SHARED, Candidate
+from sysid_node.gap.estimation.candidates import PER_CONTROL, SHARED, Candidate
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.residuals.parameter_priors import bounds
@@ -106,7 +106,7 @@ def best_screened(pairs: Sequence[ScreenedPair], most: int, thresholds: Threshol
     kept = []
     for pair in _likely_variants(pairs, thresholds):
         explanation, candidate = id(pair.explanation), pair.screened.candidate
-        law = _law(candidate)
+        law = f"{candidate.effect} {candidate.law}"
         if counts[explanation, ""] < most and counts[explanation, law] < thresholds.search.per_effect:
             again = candidate.effect in SHARED and (explanation, candidate.effect) in seen
             counts.update([(explanation, law), *([] if again else [(explanation, "")])])
@@ -134,15 +134,10 @@ def _likely_variants(pairs: Sequence[ScreenedPair], thresholds: Thresholds) -> l
     return [pair for pair in pairs if not _is_variant(pair.screened.candidate) or id(pair) in chosen]
 
 
-def _law(candidate: Candidate) -> str:
-    """The effect of a candidate; a lag of second order has another law than those of first."""
-    return candidate.label if candidate.label == SECOND_ORDER else candidate.effect
-
-
 def _varied(candidate: Candidate) -> str:
-    """What a candidate is a variant of: its effect, and of wrong derivatives the coefficient."""
+    """What a candidate is a variant of: its effect and law, and of wrong derivatives the coefficient."""
     coefficient = candidate.scope.partition("_")[0] if candidate.effect == DERIVATIVE_ERROR else ""
-    return f"{_law(candidate)} {coefficient}"
+    return f"{candidate.effect} {candidate.law}{coefficient}"
 
 
 def _is_variant(candidate: Candidate) -> bool:

@@ -85,7 +85,7 @@ def test_a_wide_free_play_is_found_behind_the_minima_of_narrow_ones(loose) -> No
 def test_a_lag_of_second_order_takes_no_place_of_one_controls_lag() -> None:
     base = explanation()
     names = ("actuator_lag of second order", "actuator_lag of aileron", "actuator_lag", "actuator_lag of each control")
-    lags = [Candidate("actuator_lag", name, (0,), ((0.1,),)) for name in names]
+    lags = [Candidate("actuator_lag", n, (0,), ((0.1,),), law="second order" if "second" in n else "") for n in names]
     others = [labelled(effect) for effect in ("cg_shift", "mass_error")]
     pairs = [ScreenedPair(base, Screened(float(k), each, (0.1,))) for k, each in enumerate([*lags, *others])]
     kept = [pair.screened.candidate.label for pair in best_screened(pairs, 2)]
