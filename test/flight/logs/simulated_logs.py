@@ -98,31 +98,12 @@ def px4_log(
     us = microseconds(record)
     middle = int(us[us.size // 2])
     at = {name: picked(record, rate) for name, rate in rates.items()}
-    motion = np.column_stack([record[name] for name in ("p", "q", "r", "ax", "ay", "az")])[at["imu"]]
-    euler = np.column_stack([record[name] for name in ("phi", "theta", "psi")])[at["attitude"]]
-    wxyz = np.roll(quaternion_from_euler(euler, "frd"), 1, axis=1)
-    commands = fractions(record)[at["controls"]]
-    speed, rho = record["V"][at["airspeed"]], record["rho"][at["air"]]
     topics = [
-        Topic("sensor_combined", us[at["imu"]], {
-            "gyro_rad[3]": ("float", motion[:, :3]),
-            "accelerometer_timestamp_relative": ("int32_t", np.zeros(len(motion), int)),
-            "accelerometer_m_s2[3]": ("float", motion[:, 3:]),
-        }),
-        Topic("vehicle_attitude", us[at["attitude"]], {"q[4]": ("float", wxyz)}),
-        Topic("airspeed_validated", us[at["airspeed"]], {
-            "true_airspeed_m_s": ("float", speed),
-            "selected_airspeed_index" if old else "airspeed_source": ("int8_t", np.ones(speed.size, int)),
-        }),
-        Topic("vehicle_air_data", us[at["air"]], {"rho": ("float", rho)}),
-        Topic("vehicle_status", us[:1], {
-            "arming_state": ("uint8_t", np.array([2])), "vehicle_type": ("uint8_t", np.array([vehicle_type])),
-            "is_vtol": ("bool", np.array([False])), "in_transition_mode": ("bool", np.array([False])),
-        }),
-        Topic("vehicle_land_detected", us[:1], {"landed": ("bool", np.array([False]))}),
-        *_px4_controls(us[at["controls"]], commands, old=old, elevons=elevons),
+        *_px4_motion(record, us, at, old=old),
+        *_px4_status(us, vehicle_type),
+        *_px4_controls(us[at["controls"]], fractions(record)[at["controls"]], old=old, elevons=elevons),
         *(_vane(record, at["airspeed"], name, span) for name, span in (vanes or {}).items()),
-    ]  # fmt: skip
+    ]
     parameters = {} if old else _px4_parameters(elevons=elevons)
     if pulses:
         topics, stated = _as_pulses(topics, pulses)
@@ -144,6 +125,38 @@ def px4_log(
     jumping = (lambda time: time + (round(jump * 1e6) if time > middle else 0)) if jump else None
     write_ulog(path, kept, parameters, release, jumping, vehicle)
     return record
+
+
+def _px4_motion(record: FlightRecord, us: np.ndarray, at: Mapping[str, np.ndarray], *, old: bool) -> list[Topic]:
+    """IMU, attitude and air data, at the stamps ``us`` of the samples ``at`` which each topic keeps."""
+    motion = np.column_stack([record[name] for name in ("p", "q", "r", "ax", "ay", "az")])[at["imu"]]
+    euler = np.column_stack([record[name] for name in ("phi", "theta", "psi")])[at["attitude"]]
+    wxyz = np.roll(quaternion_from_euler(euler, "frd"), 1, axis=1)
+    speed, rho = record["V"][at["airspeed"]], record["rho"][at["air"]]
+    return [
+        Topic("sensor_combined", us[at["imu"]], {
+            "gyro_rad[3]": ("float", motion[:, :3]),
+            "accelerometer_timestamp_relative": ("int32_t", np.zeros(len(motion), int)),
+            "accelerometer_m_s2[3]": ("float", motion[:, 3:]),
+        }),
+        Topic("vehicle_attitude", us[at["attitude"]], {"q[4]": ("float", wxyz)}),
+        Topic("airspeed_validated", us[at["airspeed"]], {
+            "true_airspeed_m_s": ("float", speed),
+            "selected_airspeed_index" if old else "airspeed_source": ("int8_t", np.ones(speed.size, int)),
+        }),
+        Topic("vehicle_air_data", us[at["air"]], {"rho": ("float", rho)}),
+    ]  # fmt: skip
+
+
+def _px4_status(us: np.ndarray, vehicle_type: int) -> list[Topic]:
+    """An armed vehicle of this type in the air."""
+    return [
+        Topic("vehicle_status", us[:1], {
+            "arming_state": ("uint8_t", np.array([2])), "vehicle_type": ("uint8_t", np.array([vehicle_type])),
+            "is_vtol": ("bool", np.array([False])), "in_transition_mode": ("bool", np.array([False])),
+        }),
+        Topic("vehicle_land_detected", us[:1], {"landed": ("bool", np.array([False]))}),
+    ]  # fmt: skip
 
 
 #: Outputs of servos 1 to 4: their number, shortest and longest pulse (us), and whether they are reversed.
