@@ -74,14 +74,14 @@ def flown(world: World, turbulence: str, manoeuvre: str, random: np.random.Gener
     names = (*reality.controls, "thrust")
     moments, given, command = [], [], dict(reality.trim)
     for k, row in enumerate(gusts.tolist()):
+        if k % round(RATE / PILOT_RATE) == 0:
+            command = hands.command({n: float(planned[n][k]) for n in names}, now)
+            command["thrust"] = min(max(command["thrust"], 0.0), full)
+        reality.step(command, row, min(k / RATE, 1.0))
+        # JSBSim moves the body by the loads before, then computes those of this command: both belong to this instant
         if k % LOOK == 0:
-            if k % round(RATE / PILOT_RATE) == 0:
-                command = hands.command({n: float(planned[n][k]) for n in names}, now)
-                command["thrust"] = min(max(command["thrust"], 0.0), full)
+            now = reality.instant()
             moments.append(now)
             given.append([command[n] for n in names])
-        reality.step(command, row, min(k / RATE, 1.0))
-        if (k + 1) % LOOK == 0:
-            now = reality.instant()
     parts = [np.array(part, float) for part in zip(*moments, strict=True)]
     return Log(np.arange(len(moments)) * LOOK / RATE, *parts, np.array(given), reality.cg)

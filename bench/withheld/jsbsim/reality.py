@@ -133,14 +133,15 @@ class Servo:
 
     def __init__(self, values: Mapping[str, float], start: float, step: float) -> None:
         self._values, self._step = values, step
-        self._late = deque([start] * (round(values.get("command_delay", 0.0) / step) + 1))
+        whole, self._part = divmod(values.get("command_delay", 0.0) / step, 1.0)
+        self._given = deque([start] * (int(whole) + 2), int(whole) + 2)  # commands, the newest last
         self._lagged = self._linked = self._position = start
 
     def move(self, command: float) -> float:
         """The surface's effective deflection (rad) one step on."""
         values, step = self._values, self._step
-        self._late.append(command)
-        command = self._late.popleft()
+        self._given.append(command)
+        command = self._part * self._given[0] + (1.0 - self._part) * self._given[1]
         lag = values.get("actuator_lag", 0.0)
         self._lagged += (command - self._lagged) * (1.0 - math.exp(-step / lag) if lag else 1.0)
         half = 0.5 * values.get("actuator_backlash", 0.0)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import fftconvolve
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
@@ -21,14 +20,11 @@ from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import Streams
 from sysid_node.gap.flightdata import flow_angles as inferred
 from sysid_node.gap.flightdata.thrust import thrust_missing, with_inferred_thrust
+from sysid_node.sim.prediction.signals import unfiltered_columns
+from sysid_node.sim.signals.low_pass import gaussian_taps, low_passed
 
 #: Rate at which forces are predicted, Hz: more than ten times the highest frequency that is compared.
 ANALYSIS_RATE = 50.0
-
-#: Frequency at which the zero-phase low-pass before flights are resampled has a gain of 0.707, Hz. Commands pass it,
-#: too, so that a linear chain stays the same. It is Gaussian, because a step must not overshoot: a free play would hold
-#: the surface where the overshoot has taken it, and a rate limit would answer to slopes that were not commanded.
-_CORNER = 11.0
 
 #: Shortest flight that can be diagnosed, s: three windows of at least a short period each.
 SHORTEST_FLIGHT = 6.0
@@ -155,6 +151,7 @@ def resampled(flight: GapFlight, rate: float = ANALYSIS_RATE) -> FlightRecord:
     """The flight at ``rate``, Hz, low-passed with zero phase, with angular accelerations.
 
     Columns ``p_rate q_rate r_rate`` (rad/s^2) are fourth-order central differences of the rates before the low-pass.
+    Commands are also kept as they were before it, in the columns of ``unfiltered_columns``.
     """
     record = flight.record
     factor = max(1, round(flight.imu_rate / rate))
@@ -166,9 +163,17 @@ def resampled(flight: GapFlight, rate: float = ANALYSIS_RATE) -> FlightRecord:
             columns[name] = _on_grid(record.time, whole, fine, smooth=name in _SMOOTH)
     for name in ("p", "q", "r"):
         columns[f"{name}_rate"] = _slope(columns[name], rate * factor)
-    taps = _low_pass(rate * factor)
-    low = {name: _filtered(values, taps)[::factor] for name, values in columns.items()}
+    taps = gaussian_taps(rate * factor)
+    low = {name: low_passed(values, taps)[::factor] for name, values in columns.items()}
+    for name in columns.keys() - _SMOOTH - _TURNING - {f"{rate_name}_rate" for rate_name in "pqr"}:
+        low |= _unfiltered(record, name, fine[::factor], 1.0 / rate)
     return FlightRecord(fine[::factor], low, record.name, record.start_ns)
+
+
+def _unfiltered(record: FlightRecord, name: str, time: Array, step: float) -> dict[str, Array]:
+    """A command at the times (s) of the samples and between them, before the low-pass."""
+    parts = unfiltered_columns(name)
+    return {part: np.interp(time + step * i / len(parts), record.time, record[name]) for i, part in enumerate(parts)}
 
 
 #: Columns that are interpolated by a cubic spline; the others (commands) are interpolated linearly.
@@ -188,22 +193,3 @@ def _slope(values: Array, rate: float) -> Array:
     """Time derivative (N,) by fourth-order central differences; at the ends the nearest inner value."""
     inner = (8.0 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) * rate / 12.0
     return np.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
-
-
-def _low_pass(rate: float) -> Array:
-    """Taps of the Gaussian low-pass, five standard deviations to each side; one tap where the rate is too low."""
-    if rate <= 2.2 * _CORNER:
-        return np.ones(1)
-    spread = np.sqrt(np.log(2.0)) / (2.0 * np.pi * _CORNER)  # s, of a Gaussian whose gain is 0.707 at the corner
-    half = int(5.0 * spread * rate)
-    taps: Array = np.exp(-0.5 * (np.arange(-half, half + 1) / (rate * spread)) ** 2)
-    taps /= taps.sum()
-    return taps
-
-
-def _filtered(values: Array, taps: Array) -> Array:
-    """A series (N,) through a symmetric filter, without delay; its ends are held."""
-    half = taps.size // 2
-    padded = np.pad(values, half, mode="edge")
-    low: Array = fftconvolve(padded, taps, mode="valid")
-    return low

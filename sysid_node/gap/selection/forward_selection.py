@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted
-from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, Candidate, candidates_of
+from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, Candidate, candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, Nuisances
 from sysid_node.gap.estimation.predictive_density import probabilities
@@ -116,8 +116,9 @@ def attribute(
     base = fitter.fit_set(unfitted(models, nuisances), [])
     chosen, stages = _forward(fitter, base, candidates, progress)
     progress(0.8, "whether another effect would do as well")
-    delays = [each for each in candidates if each.effect in RESPONSE_DELAYS]
-    chosen, causes, doubted = select_causes(fitter, base, chosen, stages, delays)
+    variants = {each.effect for each in chosen.fit.candidates if each.effect in SHARED}
+    always = [each for each in candidates if each.effect in RESPONSE_DELAYS | variants]
+    chosen, causes, doubted = select_causes(fitter, base, chosen, stages, always)
     return Attribution(
         base=base,
         chosen=chosen,

@@ -30,6 +30,7 @@ from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim.flying.rollout import Pilot, StepState, advance, begin
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import OUTPUTS, AircraftNumbers, ParameterLayout, Scalar
+from sysid_node.sim.prediction.carried_states import actuators_of
 from sysid_node.sim.signals.time_shift import shift_cubic
 from sysid_node.sim.stations import command
 
@@ -39,6 +40,7 @@ class Course(NamedTuple):
 
     motion: InstrumentReadings
     commands: Scalar  # (N, controls + 1) rad, thrust N, as recorded
+    unfiltered: Scalar  # (N, K, controls) rad, before the low-pass, see ``MeasuredSignals``
     altitude: Scalar  # (N,) m, at which the standard air has the density that was measured
     moving: Scalar  # (N, 3) velocity of the air that is added to what the air data show, m/s
     turning: Scalar  # (N, 3) rotation of the air, rad/s
@@ -73,7 +75,9 @@ def fly(layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, course: 
     """The readings with parameters (P,) beside a flight; a pure function of arrays, compiled."""
     chain = Chain.of(layout, model, theta, step, course.altitude[0])
     samples = corrected_motion(chain, course.motion)
-    arriving = command.arrive(layout, chain.effects, course.commands, step)
+    moved = actuators_of(chain, course.unfiltered)
+    thrust = command.arrive(layout, chain.effects, course.commands, step)[:, -1:]
+    arriving, chain = jnp.concatenate([moved, thrust], axis=1), chain.without_servos()
     air = _air(samples, course.begins, step)
     gusts = jnp.concatenate([air + course.moving, course.turning], axis=1)
     starts = _starts(samples, course)
@@ -156,7 +160,8 @@ def course_of(model: ResidualModel, size: int) -> Course:
     begins = jnp.arange(altitude.size) % size == 0
     still = jnp.zeros((altitude.size, 3))
     assert given.motion is not None
-    return Course(given.motion, given.signals.commands, altitude, still, still, begins)
+    assert given.signals.unfiltered is not None
+    return Course(given.motion, given.signals.commands, given.signals.unfiltered, altitude, still, still, begins)
 
 
 class Beginnings(NamedTuple):

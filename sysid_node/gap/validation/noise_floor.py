@@ -111,12 +111,16 @@ def _recorded(model: ResidualModel, course: Course, readings: Array, noise: dict
     turning = _rates_of_change(readings[:, 3:6], np.asarray(course.begins), model.simulator.step)
     symbols = [*model.simulator.layout.symbols, *(["thrust"] if model.simulator.aircraft.throttle else [])]
     commands = np.asarray(course.commands).copy()
-    commands[: len(readings), : len(symbols)] += np.column_stack([noise[s] for s in symbols])
+    unfiltered, added = np.asarray(course.unfiltered).copy(), np.column_stack([noise[s] for s in symbols])
+    commands[: len(readings), : len(symbols)] += added
+    unfiltered[: len(readings)] += added[:, None, : unfiltered.shape[2]]
     short = course.altitude.size - len(readings)
     parts = [*np.split(readings, (3, 6, 9), axis=1), turning]
     force, rates, attitude, air, turned = (jnp.pad(jnp.asarray(p), ((0, short), (0, 0)), mode="edge") for p in parts)
     return course._replace(
-        motion=InstrumentReadings(force, rates, turned, air, attitude), commands=jnp.asarray(commands)
+        motion=InstrumentReadings(force, rates, turned, air, attitude),
+        commands=jnp.asarray(commands),
+        unfiltered=jnp.asarray(unfiltered),
     )
 
 

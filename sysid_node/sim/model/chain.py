@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -48,6 +48,14 @@ class Chain:
         effects = unpack(layout, theta)
         servos = Servos.of(layout, effects, step)
         return cls(layout, model, effects, mass.properties(model, effects), servos, step, altitude)
+
+    def without_servos(self) -> Chain:
+        """The chain with actuators that follow at once: for commands that are the actuators' positions already."""
+        neutral = {
+            name: {key: jnp.zeros_like(value) for key, value in values.items()} if name in actuator.SERVOS else values
+            for name, values in self.effects.items()
+        }
+        return replace(self, effects=neutral, servos=Servos.of(self.layout, neutral, self.step))
 
 
 class Drive(NamedTuple):

@@ -65,7 +65,7 @@ def predict_accelerations(
     chain = Chain.of(layout, model, theta, step, jnp.zeros(()))
     motion = true_motion(chain, signals)
     acts = partial(effect_acts, layout, acting)
-    states = carried_states(chain, motion, acts)
+    states = carried_states(chain, motion, acts, signals.unfiltered)
     force, acceleration = _accelerations(chain, states, motion)
     rigid = _VibratingMotion(motion.rates, force, acceleration, jnp.zeros((*force.z.shape, 2)))
     vibrating = evaluate_if(

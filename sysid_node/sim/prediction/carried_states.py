@@ -9,13 +9,15 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from sysid_node.sim.effects import actuator_backlash, actuator_lag, actuator_rate_limit, stall_separation
+from sysid_node.sim.effects import actuator_lag, stall_separation
 from sysid_node.sim.effects.actuator_lag import first_order
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import Scalar
 from sysid_node.sim.prediction.active_effects import EffectActs, evaluate_if
 from sysid_node.sim.prediction.true_motion import TrueMotion, flow_at
-from sysid_node.sim.stations import propulsion
+from sysid_node.sim.signals.low_pass import low_passed_every
+from sysid_node.sim.stations import actuator, command, propulsion
+from sysid_node.sim.stations.actuator import ActuatorState, Servos
 
 
 class CarriedStates(NamedTuple):
@@ -26,39 +28,59 @@ class CarriedStates(NamedTuple):
     separation: Scalar  # (N,) attached fraction of the flow, 0 to 1
 
 
-def carried_states(chain: Chain, motion: TrueMotion, acts: EffectActs) -> CarriedStates:
-    """The states at each sample of the motion (N,), settled on the first sample."""
+def carried_states(
+    chain: Chain, motion: TrueMotion, acts: EffectActs, unfiltered: Scalar | None = None
+) -> CarriedStates:
+    """The states at each sample of the motion (N,), settled on the first sample.
+
+    ``unfiltered`` (N, K, controls) are the recorded commands before a low-pass, see ``MeasuredSignals``.
+    """
     return CarriedStates(
-        _actuators(chain, motion.command[:, :-1], acts),
+        _actuators(chain, motion.command[:, :-1], acts, unfiltered),
         _motor(chain, motion.command[:, -1], acts),
         evaluate_if(acts("stall_separation"), lambda: _separation(chain, motion), lambda: jnp.ones_like(motion.time)),
     )
 
 
-def _actuators(chain: Chain, commands: Scalar, acts: EffectActs) -> Scalar:
-    """Actuator positions (N, controls), rad, from their commands (N, controls).
-
-    The stages follow one another as in ``actuator.advance`` of the stations.
-    """
-    effects, h, controls = chain.effects, chain.step, chain.layout.controls
-
-    def linked(x: Scalar, u: Scalar) -> Scalar:
-        play = effects["actuator_backlash"]
-        return jnp.stack([actuator_backlash.advance(play, name, x[i], u[i]) for i, name in enumerate(controls)])
+def _actuators(chain: Chain, commands: Scalar, acts: EffectActs, unfiltered: Scalar | None) -> Scalar:
+    """Actuator positions (N, controls), rad, from the commands (N, controls) that reach them."""
+    limited = jnp.clip(commands, -chain.model.limits, chain.model.limits)
 
     def follow() -> Scalar:
         def step(last: tuple[Scalar, Scalar, Scalar], now: Scalar) -> tuple[tuple[Scalar, Scalar, Scalar], Scalar]:
             x, rate, before = last
-            x, rate = actuator_lag.advance(chain.servos.lag, x, rate, before, now, h)
+            x, rate = actuator_lag.advance(chain.servos.lag, x, rate, before, now, chain.step)
             return (x, rate, now), x
 
         return jax.lax.scan(step, (limited[0], jnp.zeros_like(limited[0]), limited[0]), limited)[1]
 
-    limited = jnp.clip(commands, -chain.model.limits, chain.model.limits)
-    rate = partial(actuator_rate_limit.advance, chain.servos.inverse_rate)
-    position = evaluate_if(acts("actuator_lag"), follow, lambda: limited)
-    position = _carried(acts("actuator_backlash"), linked, position)
-    return _carried(acts("actuator_rate_limit"), lambda x, u: rate(x, u, h), position)
+    def linear() -> Scalar:
+        return evaluate_if(acts("actuator_lag"), follow, lambda: limited)
+
+    play, limit = acts("actuator_backlash"), acts("actuator_rate_limit")
+    abrupt = None if play is None or limit is None else play | limit
+    if unfiltered is None:
+        return evaluate_if(abrupt, lambda: _moved(chain, commands, chain.servos, chain.step), linear)
+    return evaluate_if(abrupt, lambda: actuators_of(chain, unfiltered), linear)
+
+
+def actuators_of(chain: Chain, unfiltered: Scalar) -> Scalar:
+    """Low-passed actuator positions (N, controls), rad, from recorded commands (N, K, controls) before the low-pass."""
+    samples, factor, controls = unfiltered.shape
+    step = chain.step / factor
+    arriving = command.arrive(chain.layout, chain.effects, unfiltered.reshape(samples * factor, controls), step)
+    moved = _moved(chain, arriving, Servos.of(chain.layout, chain.effects, step), step)
+    return low_passed_every(moved, step, factor)
+
+
+def _moved(chain: Chain, commands: Scalar, servos: Servos, step: Scalar) -> Scalar:
+    """Actuator positions (N, controls), rad, under commands (N, controls) every ``step`` s, by all their stages."""
+
+    def advance(state: ActuatorState, now: Scalar) -> tuple[ActuatorState, Scalar]:
+        state = actuator.advance(chain.layout, chain.model, chain.effects, servos, state, now, step)
+        return state, state.position
+
+    return jax.lax.scan(advance, actuator.start(chain.model, commands[0]), commands)[1]
 
 
 def _motor(chain: Chain, commands: Scalar, acts: EffectActs) -> Scalar:
@@ -66,16 +88,6 @@ def _motor(chain: Chain, commands: Scalar, acts: EffectActs) -> Scalar:
     attainable = propulsion.commanded(chain.model, commands)
     advance = partial(propulsion.advance, chain.effects, step=chain.step)
     return _lagged(acts("motor_lag"), advance, attainable)
-
-
-def _carried(acts: Scalar | None, advance: Callable[[Scalar, Scalar], Scalar], series: Scalar) -> Scalar:
-    """The output (N, ...) of x[k] = advance(x[k-1], u[k]) under the series u; the series itself where nothing acts."""
-
-    def step(last: Scalar, now: Scalar) -> tuple[Scalar, Scalar]:
-        state = advance(last, now)
-        return state, state
-
-    return evaluate_if(acts, lambda: jax.lax.scan(step, series[0], series)[1], lambda: series)
 
 
 def _lagged(acts: Scalar | None, advance: Callable[[Scalar, Scalar, Scalar], Scalar], series: Scalar) -> Scalar:

@@ -34,13 +34,25 @@ class MeasuredSignals(NamedTuple):
     velocity: Vector | None = None
     alpha_rate: Scalar | None = None  # (N,) rad/s; replaces the difference quotient of alpha where it is given
     air_rotation: Vector | None = None  # (N,) rad/s, of the air about body axes; none where it is not known
+    #: (N, K, controls) rad: the surfaces' commands at K times the rate, before the flight was low-passed; none where it
+    #: was not. Servos that are not linear are driven by them, and the surfaces are low-passed.
+    unfiltered: Scalar | None = None
+
+
+#: Commands before the low-pass in the time of one sample.
+COMMANDS_PER_SAMPLE = 4
+
+
+def unfiltered_columns(name: str) -> tuple[str, ...]:
+    """Columns of a low-passed record with a command before the low-pass, at each sample and between it and the next."""
+    return tuple(f"{name}_unfiltered_{i}" for i in range(COMMANDS_PER_SAMPLE))
 
 
 def signals_of(simulator: Simulator, record: FlightRecord) -> MeasuredSignals:
     """The signals of a record at the simulator's rate, by cubic interpolation; commands by linear interpolation.
 
-    Raises InputError where rates, airspeed, flow angles, density, a control or the thrust of an aircraft with an
-    engine is missing.
+    A record that was low-passed has the rate of the simulator already. Raises InputError where rates, airspeed, flow
+    angles, density, a control or the thrust of an aircraft with an engine is missing.
     """
     thrust = () if simulator.aircraft.throttle is None else ("thrust",)
     needed = ("p", "q", "r", "V", "alpha", "beta", "rho", *simulator.layout.symbols, *thrust)
@@ -60,7 +72,16 @@ def signals_of(simulator: Simulator, record: FlightRecord) -> MeasuredSignals:
         density=jnp.asarray(smooth["rho"]),
         commands=jnp.asarray(np.column_stack(commands)),
         climb=jnp.asarray(_climb(record, time)),
+        unfiltered=_unfiltered(simulator, record),
     )
+
+
+def _unfiltered(simulator: Simulator, record: FlightRecord) -> Scalar | None:
+    """The commands (N, K, controls) before the low-pass; none where the record has none."""
+    columns = [unfiltered_columns(name) for name in simulator.layout.symbols]
+    if not all(name in record.columns for parts in columns for name in parts):
+        return None
+    return jnp.stack([jnp.stack([record.columns[name] for name in parts], 1) for parts in columns], 2)
 
 
 def _climb(record: FlightRecord, time: Array) -> Array:

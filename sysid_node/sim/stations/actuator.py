@@ -22,6 +22,9 @@ from sysid_node.sim.effects.actuator_lag import Transition
 from sysid_node.sim.effects.base import of_control
 from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar, Values
 
+#: Effects between a command and the actuator's position, which have a state.
+SERVOS = frozenset(effect.EFFECT.name for effect in (actuator_lag, actuator_backlash, actuator_rate_limit))
+
 
 class ActuatorState(NamedTuple):
     """The state of the actuators, rad; each (controls,)."""

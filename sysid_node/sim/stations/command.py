@@ -10,8 +10,11 @@ from sysid_node.sim.signals.time_shift import shift_columns
 
 
 def arrive(layout: ParameterLayout, effects: dict[str, Values], commands: Scalar, step: Scalar) -> Scalar:
-    """Commands (N, m) as they reach the actuators, from commands as they were recorded; step in s."""
-    late = delays(layout, effects) - effects["actuator_stamp_delay"]["delay"]
+    """Commands (N, m) as they reach the actuators, from commands as they were recorded; step in s.
+
+    They are those of all controls and the throttle, or of the controls alone.
+    """
+    late = delays(layout, effects)[: commands.shape[1]] - effects["actuator_stamp_delay"]["delay"]
     return shift_columns(commands, late / step)
 
 

@@ -19,6 +19,7 @@ from sysid_node.gap.flightdata.gap_flight import (
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import fly_sortie
+from sysid_node.sim.prediction.signals import unfiltered_columns
 
 RATE, DURATION = 200.0, 20.0
 NAMES = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "phi", "theta", "psi", "thrust")
@@ -74,6 +75,12 @@ def test_a_step_does_not_overshoot(aircraft, time) -> None:
     """A free play would hold the surface where an overshoot has taken it."""
     record = resampled(flight_with(aircraft, de=np.where(time > 5.0, 0.1, 0.0)))
     assert record["de"].min() > -1e-9 and record["de"].max() < 0.1 + 1e-9
+
+
+def test_commands_are_also_kept_as_they_were_recorded(aircraft, time) -> None:
+    record = resampled(flight_with(aircraft, de=np.where(time > 5.005, 0.1, 0.0)))
+    kept = np.column_stack([record[name] for name in unfiltered_columns("de")]).ravel()  # 200 Hz
+    np.testing.assert_array_equal(kept, np.where(np.arange(kept.size) / 200.0 > 5.005, 0.1, 0.0))
 
 
 def test_the_time_base_is_regular(aircraft) -> None:
