@@ -24,8 +24,8 @@ _STRUCTURAL_FREQUENCY = ("structural_mode", "frequency")
 #: Farthest that an instrument may be off its place, in spans: a nose boom is shorter than a fuselage.
 _FARTHEST = {"vane_lever_arm": 1.5, "imu_lever_arm": 1.0}
 
-#: Damping of a servo of second order. With more of it, a lag of first order describes the servo as well.
-_SERVO_DAMPING = (0.3, 1.5)
+#: Damping of a servo of second order. With more of it, it is two lags of first order, of which the slower one counts.
+_SERVO_DAMPING = (0.3, 1.0)
 
 #: Standard deviation of an onset's prior, s: it may lie at any time of the flight.
 _ONSET_SIGMA = 100.0
