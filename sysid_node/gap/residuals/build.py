@@ -82,7 +82,7 @@ def residual_model_of(
     followed = ObserverMemory(memory, 0.0 if is_gusty(calm) else LONGEST_MEMORY)
     shorter = noiseless_model(simulator, flight, record, windows, axes, followed)
     known = _with_measured_noise(replace(shorter, gusts=calm.gusts, instruments=instruments), seed)
-    return replace(known, gain=_noise_gain(known, seed))
+    return replace(known, gain=_noise_gain(known, seed)) if followed.vane == 0.0 else known
 
 
 def residual_model_like(model: ResidualModel, record: FlightRecord) -> ResidualModel:

@@ -20,7 +20,7 @@ from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.windowed_spectra import Complex, Windows
 
 #: Effects whose parameters change how much of the measured flow's noise is in the predicted forces and moments.
-_EFFECTS = ("derivative_error.", "inertia_error.", "mass_error.", "turbulence.rotation", "air_data_lag.")
+_EFFECTS = ("derivative_error.", "inertia_error.", "mass_error.", "turbulence.rotation")
 
 
 @dataclass(frozen=True, eq=False)
