@@ -49,7 +49,7 @@ def test_instruments_may_be_off_their_place_in_proportion_to_the_span(aircraft) 
 
 def test_a_servo_of_second_order_has_a_damping_that_servos_have(simulator) -> None:
     low, high = bounds(simulator, [simulator.names.index("actuator_lag.damping")])
-    assert (low[0], high[0]) == (0.3, 1.5)
+    assert (low[0], high[0]) == (0.3, 1.0)
 
 
 def test_every_neutral_value_but_of_a_jam_a_mode_and_a_damping_lies_within_its_bounds(simulator) -> None:
