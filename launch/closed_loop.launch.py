@@ -43,6 +43,12 @@ def arguments() -> list[DeclareLaunchArgument]:
             description="what makes the aircraft differ from its file: name:key=value, a space between",
         ),
         DeclareLaunchArgument(
+            "surfaces",
+            default_value="measured",
+            description="what the topic actuators carries: positions of the surfaces, or commands",
+            choices=["measured", "commanded"],
+        ),
+        DeclareLaunchArgument(
             "adapt",
             default_value="true",
             description="false: the aircraft file's gains, whatever is identified",
@@ -80,6 +86,7 @@ def generate_launch_description() -> LaunchDescription:
         "turbulence": value(argument("turbulence"), value_type=str),
         "speed": value(speed, value_type=float),
         "effects": value(argument("effects"), value_type=str),
+        "surfaces": value(argument("surfaces"), value_type=str),
     }
     method = value(argument("method"), value_type=str)
     adapt = value(argument("adapt"), value_type=bool)

@@ -120,7 +120,7 @@ ARGUMENTS = {
         *("imu", "air_data", "actuators"),
     },
     "closed_loop.launch.py": {
-        *("aircraft", "namespace", "turbulence", "speed", "effects", "adapt", "method", "bag"),
+        *("aircraft", "namespace", "turbulence", "speed", "effects", "surfaces", "adapt", "method", "bag"),
     },
 }
 

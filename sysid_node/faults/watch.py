@@ -153,7 +153,8 @@ def _take(watch: MessageWatch, samples: Sequence[AlignedSample]) -> None:
         watch.now, watch.stamp_ns = moment, intake.stamp_of(watch.intake, moment)
         count = watch.state.history.count
         rate_limits.move(watch.limits, moment, sample)
-        monitor.update(watch.state, moment, servo_follower.deflected(watch.follower, moment, sample))
+        learning = watch.judged <= 0.0
+        monitor.update(watch.state, moment, servo_follower.deflected(watch.follower, moment, sample, learning=learning))
         if watch.state.history.count > count and watch.state.history.latest is not None:
             rate_limits.take(watch.limits, watch.state.history.latest, watch.state.whitening.filter)
 

@@ -45,6 +45,8 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add("--fixed", dest="adapt", action="store_false", help="with the fixed gains of the aircraft file, to compare")
     add("--turbulence", default="none", help="none, light, moderate or severe (default: none)")
     add("--method", choices=METHODS, default="sls_rft", help="of the identifier (default: sls_rft)")
+    meaning = "commands reach the identifier, or measured positions of the surfaces (default: commanded)"
+    add("--surfaces", choices=("commanded", "measured"), default="commanded", help=meaning)
     add("--out", metavar="DIR", type=Path, default=Path("out/loop"), help="default: out/loop")
     options.add_force(parser)
     return parser
@@ -57,7 +59,15 @@ def run(args: argparse.Namespace) -> None:
     aircraft = load_aircraft(args.aircraft)
     own_domain()
     scenario = LoopScenario(
-        aircraft, args.aircraft, args.fail, args.seconds, args.adapt, args.turbulence, args.method, args.out
+        aircraft,
+        args.aircraft,
+        args.fail,
+        args.seconds,
+        args.adapt,
+        args.turbulence,
+        args.method,
+        args.out,
+        args.surfaces,
     )
     scenario.check_effects()
     inputs, logs = options.inputs_of([], args.aircraft), [f"{node}.log" for node in NODES]

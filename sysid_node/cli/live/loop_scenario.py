@@ -32,6 +32,7 @@ class LoopScenario:
     turbulence: str
     method: str
     out: Path
+    surfaces: str = "commanded"  # what the topic actuators carries: commands, or "measured" positions
 
     @property
     def effects(self) -> str:
@@ -54,9 +55,10 @@ class LoopScenario:
         """The command-line arguments of a node."""
         parameters = [f"aircraft:={self.name}", *NODES[node]]
         if node == "flight_simulator":
-            parameters += [f"effects:='{self.effects}'", f"turbulence:={self.turbulence}"]
+            parameters += [f"effects:='{self.effects}'", f"turbulence:={self.turbulence}", f"surfaces:={self.surfaces}"]
         if node == "identifier":
-            parameters.append(f"method:={self.method}")
+            carried = "commands" if self.surfaces == "commanded" else "positions"
+            parameters += [f"method:={self.method}", f"actuators:={carried}"]
         if node == "adaptive_controller":
             parameters.append(f"adapt:={str(self.adapt).lower()}")
         return ["--ros-args", *(word for parameter in parameters for word in ("-p", parameter))]

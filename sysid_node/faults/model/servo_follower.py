@@ -35,16 +35,22 @@ def init(aircraft: Aircraft) -> ServoFollower:
 
 
 def receive_estimates(follower: ServoFollower, time: float, servos: Mapping[str, IdentifierEstimate]) -> None:
-    """Take the servos' times (s) at a time (s); like the derivatives, they are adopted when they are 10 s old."""
+    """Take the servos' times (s) at a time (s)."""
     if follower.pending and time < follower.pending[-1][0]:
         follower.pending.clear()  # the clock has stepped back
     if not follower.pending or time - follower.pending[-1][0] >= RIPE:
         follower.pending.append((time, servos))
 
 
-def deflected(follower: ServoFollower, time: float, sample: Sequence[float]) -> Sequence[float]:
-    """The sample (``SAMPLE_COLUMNS``, then controls) at ``time`` (s) with deflections in place of commands."""
-    while follower.pending and time - follower.pending[0][0] >= RIPE:
+def deflected(
+    follower: ServoFollower, time: float, sample: Sequence[float], *, learning: bool = False
+) -> Sequence[float]:
+    """The sample (``SAMPLE_COLUMNS``, then controls) at ``time`` (s) with deflections in place of commands.
+
+    Like the derivatives, the servos' times are adopted when they are 10 s old; while the monitor is ``learning`` what
+    sound flight is like, at once, because it judges nothing then.
+    """
+    while follower.pending and (learning or time - follower.pending[0][0] >= RIPE):
         _adopt(follower, follower.pending.popleft()[1])
     end = _FIRST + len(follower.names)
     controls = list(sample[_FIRST:end])

@@ -68,6 +68,14 @@ PARAMETERS = (
         "To see the loop at work in rough air.",
         choices=tuple(INTENSITIES),
     ),
+    NodeParameter(
+        "surfaces",
+        "measured",
+        "",
+        "What the topic actuators carries: the surfaces' measured positions, or the autopilot's commands.",
+        "commanded to fly as most small aircraft do, which measure no surface.",
+        choices=("measured", "commanded"),
+    ),
     NodeParameter("noise", 1.0, "", "Sensor noise, in that of the aircraft file.", "0 for ideal sensors.", 0.0, 20.0),
     NodeParameter("seed", 0.0, "", "Of noise and turbulence.", "For another flight.", 0.0, 1e9),
 )
@@ -104,6 +112,7 @@ class FlightSimulator(LoopNode):
         """Begin a flight in trim, with the present effects."""
         self._flight = live.start(self._simulator, self._trim, self._air, self._theta)
         self._command: list[float] = self._trim.command.tolist()
+        self._reached = self._command  # the command that the aircraft reached with the present sample
         self._diverged = ""  # why the flight is none any more
         self._reported_skip = 0.0  # s that were not flown and have been reported
 
@@ -199,23 +208,23 @@ class FlightSimulator(LoopNode):
             return
         for _ in range(self._pace.due(time.monotonic(), self._flight.samples)):
             start = time.perf_counter()
+            reached, self._reached = self._reached, self._command
             now = live.step(self._simulator, self._flight, self._command)
             self._diverged = live.divergence(now)
             if self._diverged:
                 return
-            self._publish(now)
+            self._publish(now, reached)
             self._steps.add(time.perf_counter() - start)
 
-    def _publish(self, now: LiveReading) -> None:
+    def _publish(self, now: LiveReading, reached: list[float]) -> None:
+        """A sample's messages, and the command (rad, thrust N) that was reached with it."""
         stamp = self._start_ns + round(NANOSECONDS * now.time)
         if self._sim_time is not None:
             self._sim_time.publish(ClockMessage(clock=stamp_message(stamp)))
         ax, ay, az, p, q, r, *euler, V, alpha, beta = now.outputs.tolist()
         x, y, z, w = quaternion_from_euler(np.array([euler]), "flu")[0].tolist()
         orientation = Quaternion(x=x, y=y, z=z, w=w)
-        *surfaces, thrust = now.surfaces.tolist()
-        joints, positions = self._allocation.joints, self._allocation.positions(surfaces, thrust)
-        self._actuators.publish(JointState(header=header(stamp, ""), name=joints, position=positions))
+        self._publish_actuators(now, stamp, reached)
         self._air_data.publish(
             AirData(
                 header=header(stamp, "air_data"),
@@ -237,3 +246,15 @@ class FlightSimulator(LoopNode):
             x, y, z = (ENU_NED @ now.state[:3]).tolist()
             pose = Pose(position=Point(x=x, y=y, z=z), orientation=orientation)
             self._pose.publish(PoseStamped(header=header(stamp, "map"), pose=pose))
+
+    def _publish_actuators(self, now: LiveReading, stamp: int, reached: list[float]) -> None:
+        """Positions at the stamp (ns) of a sample, or the command that was reached with it.
+
+        Commands are linear between samples here: one that is reached with a sample is given half a step before.
+        """
+        commanded = self.values["surfaces"] == "commanded"
+        *surfaces, thrust = reached if commanded else now.surfaces.tolist()
+        if commanded:
+            stamp -= round(0.5 * NANOSECONDS * self._simulator.step)
+        joints, positions = self._allocation.joints, self._allocation.positions(surfaces, thrust)
+        self._actuators.publish(JointState(header=header(stamp, ""), name=joints, position=positions))

@@ -34,6 +34,7 @@ def test_it_flies_and_writes_the_report(tmp_path: Path) -> None:
     learning = {"node": "fault_monitor", "what": "learns what sound flight is like"}
     assert any(event | learning == event for event in summary["events"])
     assert all(count > 0 for count in summary["message_troubles"].values())
+    assert "Actuators carry commands" in (tmp_path / "identifier.log").read_text(encoding="utf-8")
     assert "<h3>Events</h3>" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 

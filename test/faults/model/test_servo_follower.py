@@ -48,3 +48,13 @@ def test_estimates_are_adopted_when_they_are_ten_seconds_old() -> None:
     assert follower.states.lateness == [0.0, 0.0, 0.0]
     servo_follower.deflected(follower, RIPE + 1.0, stepped(0.0))
     assert follower.states.lateness == [LATE, 0.0, 0.0]
+
+
+def test_while_the_monitor_learns_they_are_adopted_at_once_and_no_older_ones_later() -> None:
+    follower = servo_follower.init(AIRCRAFT)
+    for time, late in ((1.0, 0.05), (2.0, LATE)):
+        servo_follower.receive_estimates(follower, time, {"elevator": IdentifierEstimate(late, 0.004, True)})
+        servo_follower.deflected(follower, time, stepped(0.0), learning=True)
+        assert follower.states.lateness == [late, 0.0, 0.0]
+    servo_follower.deflected(follower, 1.0 + RIPE, stepped(0.0))
+    assert follower.states.lateness == [LATE, 0.0, 0.0]
