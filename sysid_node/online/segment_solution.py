@@ -133,6 +133,7 @@ class _SolvedEquations(NamedTuple):
 
     solution: Solution
     compensation: Array | None  # noise's part of the normal equations
+    noise: Array | None  # (W, W) of which that was made, per line and second
     spread: Uncertainty
     inflation: Array  # (C,) factors of the variances by gusts
     instruments: InstrumentChecks
@@ -154,9 +155,9 @@ def solve_all(
     gram = total.grams.sum(axis=0)
     found = _solved(state, total, gram)
     equations, spread, now = state.equations, found.spread, state.transform.last
-    before = ReferenceEstimates(now, equations, found.solution, spread)
+    before = _reference(found, found.solution, spread, equations, now)
     if signals is not None:
-        before = _with_recorded_signals(equations, recorded, found.compensation, now)
+        before = _with_recorded_signals(equations, recorded, found, now)
         yield
     systematic = yield from _systematic(state, signals, found, before.solution, at[1] if at else None)
     yield
@@ -189,14 +190,22 @@ def _variance_factors(found: _SolvedEquations, recorded: Solution, systematic: S
 
 
 def _with_recorded_signals(
-    equations: NormalEquations, recorded: Information, compensation: Array | None, now: float
+    equations: NormalEquations, recorded: Information, found: _SolvedEquations, now: float
 ) -> ReferenceEstimates:
     """The solution with the signals as they were recorded, which those between renewals and the tests for changes are.
 
     What is off in the signals is the same before a change and after it.
     """
-    solution = least_squares.solve(equations, recorded.grams.sum(axis=0), compensation)
-    return ReferenceEstimates(now, equations, solution, least_squares.uncertainty(equations, solution, recorded))
+    solution = least_squares.solve(equations, recorded.grams.sum(axis=0), found.compensation)
+    return _reference(found, solution, least_squares.uncertainty(equations, solution, recorded), equations, now)
+
+
+def _reference(
+    found: _SolvedEquations, solution: Solution, spread: Uncertainty, equations: NormalEquations, now: float
+) -> ReferenceEstimates:
+    """What later flight is tested against."""
+    noise = None if found.noise is None else regressor_noise.noise_score(equations, solution, found.noise)
+    return ReferenceEstimates(now, equations, solution, spread, noise)
 
 
 def _corrected_signals(
@@ -254,26 +263,31 @@ def _systematic(
     return found
 
 
-def _solve(state: EstimatorState, total: Information, gram: Array) -> tuple[InstrumentStrength, Solution, Array | None]:
-    """The instruments' strength, the solution by the equations that it allows, and the noise's part in them."""
+def _solve(
+    state: EstimatorState, total: Information, gram: Array
+) -> tuple[InstrumentStrength, Solution, Array | None, Array | None]:
+    """The instruments' strength, the solution by the equations that it allows, and the noise's part in them.
+
+    The last is the noise's Gram matrix (W, W) per line and second.
+    """
     full, last = state.model.equations, state.latest
     instrument_strength = least_squares.instrument_strength(full, least_squares.solve(full, gram), total)
     equations = state.equations = normal_equations.with_strong_instruments(full, instrument_strength.strength)
-    compensation = None
+    compensation, noise, amount = None, None, line_seconds(state, total)
     if last is not None and last.solution.usable:
-        share = regressor_noise.allowed(
-            equations, last.solution, last.uncertainty.density, total.bias / line_seconds(state, total)
-        )
-        compensation = least_squares.bias_of(equations, total.bias * share[:, None] * share)
+        noise = total.bias / amount
+        share = regressor_noise.allowed(equations, last.solution, last.uncertainty.density, noise)
+        noise = noise * share[:, None] * share
+        compensation = least_squares.bias_of(equations, amount * noise)
     solution = least_squares.solve(equations, gram, compensation)
     if compensation is not None and not solution.usable:
-        solution, compensation = least_squares.solve(equations, gram), None
-    return instrument_strength, solution, compensation
+        solution, compensation, noise = least_squares.solve(equations, gram), None, None
+    return instrument_strength, solution, compensation, noise
 
 
 def _solved(state: EstimatorState, total: Information, gram: Array) -> _SolvedEquations:
     """By the equations that the instruments' strength allows, which are the state's from now on."""
-    strength, solution, compensation = _solve(state, total, gram)
+    strength, solution, compensation, noise = _solve(state, total, gram)
     equations = state.equations
     spread = least_squares.uncertainty(equations, solution, total)
     noise_alone = spread.covariance
@@ -281,7 +295,7 @@ def _solved(state: EstimatorState, total: Information, gram: Array) -> _SolvedEq
         spread.covariance = noise_alone + _reconstruction_covariance(state, solution, total)
     gusts = _gust_shares(state, total, equations, solution, spread)
     checks = _instrument_checks(state, total, gram, strength, solution, spread, noise_alone, gusts)
-    return _SolvedEquations(solution, compensation, spread, gust_correlation.inflation(spread, gusts), checks)
+    return _SolvedEquations(solution, compensation, noise, spread, gust_correlation.inflation(spread, gusts), checks)
 
 
 def _instrument_checks(

@@ -8,9 +8,12 @@ themselves, whichever the estimates were solved with; C: the estimates' covarian
 
 is Fisher's F with p and the residual density's degrees of freedom. It needs no strong instruments: where they are weak,
 C is large (the test of Anderson & Rubin, Annals of Mathematical Statistics 20, 1949). Instruments from the deflections
-hold nothing of the gusts, so gusts are no contradiction. Over stretches shorter than the period of the line spacing
-Z'KZ is Z'Z over twice that spacing. S is taken by bands, and no less than what no derivatives explain of the stretch
-itself: air that has become rougher is no contradiction either.
+hold nothing of the gusts, so gusts are no contradiction. Regressors that are their own instruments hold the sensors'
+noise, which the estimates were freed of (``regressor_noise``). The score's mean is then that of the noise, and where
+the controls hardly move, it is the largest part of the score. It is taken off, as much of it as brings F down, but no
+more than the file's noise makes: how large the noise is at present is not known better. Over stretches shorter than the
+period of the line spacing Z'KZ is Z'Z over twice that spacing. S is taken by bands, and no less than what no
+derivatives explain of the stretch itself: air that has become rougher is no contradiction either.
 """
 
 from __future__ import annotations
@@ -45,12 +48,15 @@ class ReferenceEstimates:
     equations: NormalEquations
     solution: Solution
     uncertainty: Uncertainty
+    noise_score: Array | None = None  # (P, C) the score's mean by the sensors' noise, per line and second; None: zero
 
     @classmethod
     def stacked(cls, some: Sequence[ReferenceEstimates]) -> ReferenceEstimates:
         """Estimates by the same equations with an axis in front."""
         solution = Solution(*_columns([one.solution for one in some]))
-        return cls(some[0].time, some[0].equations, solution, Uncertainty(*_columns([one.uncertainty for one in some])))
+        uncertainty = Uncertainty(*_columns([one.uncertainty for one in some]))
+        scores = [one.noise_score if one.noise_score is not None else np.zeros_like(one.solution.theta) for one in some]
+        return cls(some[0].time, some[0].equations, solution, uncertainty, np.array(scores))
 
 
 def _columns(rows: Sequence[Solution] | Sequence[Uncertainty]) -> Iterator[NDArray[Any]]:
@@ -100,7 +106,12 @@ def score_test(reference: ReferenceEstimates, lines: Array, spectrum: Spectrum, 
     spread = noise + G @ known.covariance @ G.swapaxes(-1, -2)
     score = (left_over.take(equations.instruments, axis=-2) * structure.belongs).swapaxes(-1, -2)
     motion = np.maximum(gram.diagonal(axis1=-2, axis2=-1).take(equations.outputs, axis=-1), TINY)
-    return ScoreTest(_normalised(equations, spread, score) / count, count, known.freedom, excess, rest / motion)
+    by_noise = None
+    if reference.noise_score is not None:
+        amount = np.maximum(energy - NUISANCES * density_per_gram, 0.0)
+        by_noise = (amount[..., None] * reference.noise_score).swapaxes(-1, -2)
+    statistic = _normalised(equations, spread, score, by_noise) / count
+    return ScoreTest(statistic, count, known.freedom, excess, rest / motion)
 
 
 def _unexplained(
@@ -130,15 +141,23 @@ def _band_of_each(ends: tuple[int, ...]) -> NDArray[np.intp]:
     return np.tile(np.searchsorted(ends, np.arange(ends[-1]), side="right"), 2)
 
 
-def _normalised(equations: NormalEquations, spread: Array, score: Array) -> Array:
-    """(..., C) score' spread^-1 score of scores (..., C, P) over the unknowns that belong."""
+def _normalised(equations: NormalEquations, spread: Array, score: Array, by_noise: Array | None = None) -> Array:
+    """(..., C) score' spread^-1 score of scores (..., C, P) over the unknowns that belong.
+
+    Of scores less the share, none to all, of what is ``by_noise`` (..., C, P) at which it is least.
+    """
     belongs = equations.structure.belongs.T
     variance = spread.diagonal(axis1=-2, axis2=-1) * belongs
     weight = np.where(variance > 0.0, 1.0 / np.sqrt(np.maximum(variance, TINY**2)), 0.0)
     correlation = spread * weight[..., None] * weight[..., None, :]
     correlation += equations.structure.unit * (RIDGE + (weight == 0.0))[..., None]
-    scaled = score * weight
-    return np.asarray((scaled * np.linalg.solve(correlation, scaled[..., None])[..., 0]).sum(axis=-1))
+    scaled = np.stack([score * weight] if by_noise is None else [score * weight, by_noise * weight], axis=-1)
+    product = scaled.swapaxes(-1, -2) @ np.linalg.solve(correlation, scaled)
+    least: Array = product[..., 0, 0]
+    if by_noise is not None:
+        share = np.clip(product[..., 0, 1] / np.maximum(product[..., 1, 1], TINY**2), 0.0, 1.0)
+        least = least - share * (2.0 * product[..., 0, 1] - share * product[..., 1, 1])
+    return least
 
 
 def disagreement(one: ReferenceEstimates, other: ReferenceEstimates) -> Array:

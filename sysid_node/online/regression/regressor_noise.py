@@ -69,3 +69,9 @@ def allowed(equations: NormalEquations, solution: Solution, density: Array, bias
         members = np.flatnonzero(v[:, c])
         share[members] = np.minimum(share[members], density[c] / noise[c])
     return np.sqrt(share)
+
+
+def noise_score(equations: NormalEquations, solution: Solution, bias: Array) -> Array:
+    """(P, C) what the noise alone makes of Z'r, Z the instruments and r the residuals, of its ``bias`` (W, W)."""
+    left = (bias @ least_squares.misfits(equations, solution.theta)).take(equations.instruments, axis=0)
+    return np.asarray(left * equations.structure.belongs)
