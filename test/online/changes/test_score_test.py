@@ -1,6 +1,7 @@
 """Contradictions: F against plain least squares and against its distribution by Monte Carlo; changes found."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from sysid_node.online import estimator
 from sysid_node.online.changes.detection import ChangeTests
 from sysid_node.online.changes.score_test import ReferenceEstimates, ScoreTest, disagreement, score_test
 from sysid_node.online.frequency.regression_signals import SignalLayout
-from sysid_node.online.regression import normal_equations
+from sysid_node.online.regression import normal_equations, regressor_noise
 from sysid_node.online.regression.information import BANDS, spectrum
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
 from sysid_node.online.settings import METHODS, OnlineSettings
@@ -66,6 +67,25 @@ def test_uncertain_estimates_contradict_less() -> None:
     )
     assert (sure > less).all()
     assert (less > hardly).all()
+
+
+def test_the_noise_of_regressors_that_do_not_move_is_no_contradiction() -> None:
+    """Nothing moves, alpha is noise: Z'r has the mean -theta times the noise's energy, by the noise's own density."""
+    rng, duration, noise, slope = np.random.default_rng(5), 25.0, 0.3, 4.0
+    lines = math.sqrt(1e-6 * duration / 2.0) * rng.normal(size=(LINES, PLAN.width))
+    alpha = LAYOUT.column("alpha")
+    lines[:, alpha] = math.sqrt(noise * duration / 2.0) * rng.normal(size=LINES)
+    P, C = PLAN.columns.size, PLAN.outputs.size
+    theta = np.where(PLAN.columns == alpha, slope, 0.0)[:, None] * PLAN.structure.belongs
+    known = reference(theta, np.zeros((C, P, P)), noise * slope**2, 200.0)
+    bias = np.zeros((PLAN.width, PLAN.width))
+    bias[alpha, alpha] = noise
+    freed = replace(known, noise_score=regressor_noise.noise_score(PLAN, known.solution, bias))
+    before, after = (score_test(each, lines, SPECTRUM, duration).chance(1.0) for each in (known, freed))
+    assert (before < 1e-6).all() and (after > 0.05).all()
+    shifted = lines.copy()
+    shifted[:, PLAN.outputs] += 20.0 * lines[:, [alpha]]  # what noise cannot do: the score has the other sign
+    assert (score_test(freed, shifted, SPECTRUM, duration).chance(1.0) < 1e-6).all()
 
 
 def test_disagreement_is_the_chance_of_the_difference() -> None:
