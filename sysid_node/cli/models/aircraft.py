@@ -10,8 +10,11 @@ from rich.console import Console
 from rich.table import Table
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.shared import options
 from sysid_node.dynamics.handbook.handbook import Handbook, handbook
+from sysid_node.errors import InputError
+from sysid_node.online.types import Estimates
 from sysid_node.report.files.handbook_folder import write_handbook
 from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.sections import handbook as section
@@ -26,6 +29,8 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     meaning = "say what an aircraft file means, as a handbook would"
     parser = commands.add_parser("aircraft", help=meaning, description=__doc__)
     parser.add_argument("aircraft", metavar="FILE|NAME", help="aircraft file, or name as in cdrw")
+    words = "leave out the error budget, for which the file is flown in the simulator"
+    parser.add_argument("--no-budget", dest="budget", action="store_false", help=words)
     parser.add_argument("--out", metavar="DIR", type=Path, help="folder for report.html and aircraft.json")
     options.add_force(parser)
     options.add_quiet(parser)
@@ -34,18 +39,32 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> None:
     """Prints the handbook, and writes it where ``--out`` is given."""
-    book = handbook(load_aircraft(args.aircraft))
+    aircraft = load_aircraft(args.aircraft)
+    book = handbook(aircraft)
+    expected = _expected(aircraft) if args.budget else "it was not asked for"
     if args.out is not None:
         inputs = options.inputs_of([], args.aircraft)
         with output_folder(args.out, "aircraft", inputs=inputs, force=args.force) as folder:
-            folder.publish(lambda stage: write_handbook(stage, book))
+            folder.publish(lambda stage: write_handbook(stage, book, expected))
     if not args.quiet:
-        _show(book)
+        _show(book, expected)
         if args.out is not None:
             print(f"\nreport: {args.out / 'report.html'}")
 
 
-def _show(book: Handbook) -> None:
+def _expected(aircraft: Aircraft) -> Estimates | str:
+    """The estimates of a usual flight, or why there are none."""
+    from sysid_node.api.expected_estimates import expected_estimates  # noqa: PLC0415  # NumPy and SciPy take their time
+
+    try:
+        return expected_estimates(aircraft)
+    except InputError as error:
+        return f"the file cannot be flown in the simulator ({error})"
+    except ModuleNotFoundError as error:
+        return f"it needs the package {error.name}, which is not installed; run: pip install -r requirements/desk.txt"
+
+
+def _show(book: Handbook, expected: Estimates | str) -> None:
     console = Console(highlight=False, soft_wrap=True)
     console.print(f"{book.aircraft.name}: static margin {section.static_margin(book)}", style="bold", markup=False)
     tables = (
@@ -55,6 +74,10 @@ def _show(book: Handbook) -> None:
     for table in tables:
         if table.rows:
             _print(console, table)
+    if isinstance(expected, str):
+        console.print(f"\nno error budget: {expected}", markup=False)
+    elif expected.budget:
+        _print(console, section.budget_table(expected))
     if book.left_out:
         console.print(f"not part of these numbers: {', '.join(book.left_out)}", markup=False)
     unusual = [finding for finding in book.findings if finding.unusual]

@@ -9,17 +9,18 @@ from pathlib import Path
 from typing import Any
 
 from sysid_node.dynamics.handbook.handbook import Handbook
+from sysid_node.online.types import Estimates
 from sysid_node.report.pages.handbook_page import write_handbook_report
 
 
-def write_handbook(folder: Path, book: Handbook) -> None:
-    """Write aircraft.json and report.html."""
-    text = json.dumps(content(book), indent=2, ensure_ascii=False, allow_nan=False)
+def write_handbook(folder: Path, book: Handbook, expected: Estimates | str) -> None:
+    """Write aircraft.json and report.html; ``expected`` are the estimates of a usual flight, or why there are none."""
+    text = json.dumps(content(book, expected), indent=2, ensure_ascii=False, allow_nan=False)
     (folder / "aircraft.json").write_text(text + "\n", encoding="utf-8")
-    write_handbook_report(folder / "report.html", book)
+    write_handbook_report(folder / "report.html", book, expected)
 
 
-def content(book: Handbook) -> dict[str, Any]:
+def content(book: Handbook, expected: Estimates | str) -> dict[str, Any]:
     """The content of ``aircraft.json``: SI units and radians; what the file does not tell is null."""
     modes = {
         mode.name: {
@@ -41,9 +42,18 @@ def content(book: Handbook) -> dict[str, Any]:
         "derivatives_at_trim": dict(book.slopes),
         "checks": [{**asdict(f), "unusual": f.unusual} for f in book.findings],
         "left_out": list(book.left_out),
+        "error_budget": None if isinstance(expected, str) else _error_budget(expected),
     }
     plain: dict[str, Any] = _finite(found)
     return plain
+
+
+def _error_budget(expected: Estimates) -> dict[str, Any]:
+    """By derivative its standard error and the shares of its variance by source."""
+    return {
+        name: {"standard_error": expected.derivatives[name].standard_error, "shares": dict(shares)}
+        for name, shares in expected.budget.items()
+    }
 
 
 def _finite(value: Any) -> Any:

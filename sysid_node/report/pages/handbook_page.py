@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sysid_node.dynamics.handbook.handbook import Handbook
+from sysid_node.online.types import Estimates
 from sysid_node.report.pages.render import render_page
 from sysid_node.report.sections import handbook
 from sysid_node.report.sections.section import Section
@@ -21,6 +22,10 @@ SECTIONS: tuple[Section[Handbook], ...] = (
 )
 
 
-def write_handbook_report(path: Path, book: Handbook) -> None:
-    """Write the page as one HTML file."""
-    path.write_text(render_page(f"Aircraft file of {book.aircraft.name}", SECTIONS, book), encoding="utf-8")
+def write_handbook_report(path: Path, book: Handbook, expected: Estimates | str) -> None:
+    """Write the page as one HTML file; ``expected`` are the estimates of a usual flight, or why there are none."""
+    budget: Section[Handbook] = Section(
+        "budget", "Error budget", "handbook/budget.html.j2", lambda _: handbook.budget_context(expected)
+    )
+    page = render_page(f"Aircraft file of {book.aircraft.name}", (*SECTIONS, budget), book)
+    path.write_text(page, encoding="utf-8")

@@ -8,6 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from sysid_node.online.types import Estimates
 from sysid_node.report.results.run_result import RunResult
 from sysid_node.report.sections.section import Section
 from sysid_node.report.wording.names import symbol
@@ -34,8 +35,13 @@ def context(run: RunResult) -> Mapping[str, Any]:
     """
     if run.final is None:
         return {"rows": [], "stated": False}
-    rows = [_row(name, shares) for name, shares in run.final.budget.items() if shares]
+    rows = budget_rows(run.final)
     return {"rows": rows, "stated": any(d.systematic_error > 0.0 for d in run.final.derivatives.values())}
+
+
+def budget_rows(estimates: Estimates) -> list[BudgetRow]:
+    """The rows of estimates, in the derivatives' order."""
+    return [_row(name, shares) for name, shares in estimates.budget.items() if shares]
 
 
 def _row(name: str, shares: Mapping[str, float]) -> BudgetRow:

@@ -12,8 +12,10 @@ import numpy as np
 from sysid_node.aircraft.default_tolerances import default_of
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.dynamics.handbook.handbook import Handbook
+from sysid_node.online.types import Estimates
 from sysid_node.report.drawing import figures
 from sysid_node.report.drawing.figures import BLUE, Figure
+from sysid_node.report.sections import budget
 from sysid_node.report.wording.numbers import NONE, number
 
 DEGREES = 180.0 / math.pi
@@ -176,6 +178,22 @@ def tolerance_table(aircraft: Aircraft) -> TextTable:
         usual = f"{number(100 * default.share)} %" if default.share else f"{number(default.absolute)} {default.unit}"
         rows.append((key, number(value), usual))
     return TextTable("Tolerances other than the defaults", ("key", "in the file", "default"), tuple(rows))
+
+
+def budget_table(estimates: Estimates) -> TextTable:
+    """What each derivative's uncertainty would be made of after a usual flight."""
+    title = f"Error budget after {estimates.time:.0f} s of simulated flight: 3-2-1-1s, still air, commands alone"
+    headings = ("derivative", "standard error", "largest sources", "what would help most")
+    errors = {name: number(d.standard_error, 2) for name, d in estimates.derivatives.items()}
+    rows = tuple((row.name, errors[row.name], row.sources, row.advice) for row in budget.budget_rows(estimates))
+    return TextTable(title, headings, rows, numbers=False)
+
+
+def budget_context(expected: Estimates | str) -> Mapping[str, Any]:
+    """The budget as a table, or why there is none."""
+    if isinstance(expected, str):
+        return {"tables": [], "figures": [], "why": expected}
+    return {"tables": [budget_table(expected)], "figures": [], "why": ""}
 
 
 def _figure(label: str, x: Any, y: Any, below: str, beside: str) -> Figure:

@@ -4,6 +4,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 from sysid_node.aircraft.load import aircraft_folders
 from sysid_node.cli.main import main
 
@@ -26,6 +28,34 @@ def test_a_folder_has_page_and_numbers(tmp_path, capsys):
     assert sysid("cdrw", "--out", tmp_path / "book", "--quiet") == 0  # its own folder is written again
     assert main(["report", str(tmp_path / "book")]) == 2
     assert "sysid aircraft" in capsys.readouterr().err
+
+
+def test_the_error_budget_is_that_of_a_replay_of_the_same_flight(tmp_path, capsys):
+    """Truth: the summary of `sysid replay` of a flight by `sysid simulate`, of another seed and other rates."""
+    assert sysid("cdrw", "--out", tmp_path / "book") == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "swing the" in said and "Error budget after" in said
+    budget = json.loads((tmp_path / "book" / "aircraft.json").read_text())["error_budget"]
+    assert "Error budget" in (tmp_path / "book" / "report.html").read_text()
+    flight = ["--aircraft", "cdrw", "--manoeuvre", "3211:repeat=3", "--seed", "5", "--out", str(tmp_path / "bag")]
+    assert main(["simulate", *flight, "--quiet"]) == 0
+    replay = ["replay", str(tmp_path / "bag"), "--aircraft", "cdrw", "--out", str(tmp_path / "run"), "--quiet"]
+    assert main(replay) == 0
+    found = json.loads((tmp_path / "run" / "summary.json").read_text())
+    for name in ("CL_alpha", "Cm_alpha", "Cm_de", "Cl_p", "Cn_beta"):
+        other = found["derivatives"][name]["standard_error"]
+        assert budget[name]["standard_error"] == pytest.approx(other, rel=0.25)
+        assert next(iter(budget[name]["shares"])) == next(iter(found["budget"][name]))
+
+
+def test_without_a_budget_and_where_there_is_none(tmp_path, capsys):
+    assert sysid("cdrw", "--no-budget") == 0
+    assert "no error budget: it was not asked for" in capsys.readouterr().out
+    text = CDRW.read_text().replace("max_thrust: 30.0", "max_thrust: 0.1")
+    (tmp_path / "weak.yaml").write_text(text)
+    assert sysid(tmp_path / "weak.yaml", "--out", tmp_path / "weak") == 0
+    assert "no error budget: the file cannot be flown" in " ".join(capsys.readouterr().out.split())
+    assert json.loads((tmp_path / "weak" / "aircraft.json").read_text())["error_budget"] is None
 
 
 def test_a_wrong_sign_is_named_with_its_range(tmp_path, capsys):
