@@ -186,8 +186,7 @@ def _append(state: EstimatorState, time: float, sample: Sequence[float], excess:
     inputs.previous = (time, motion)
     if previous is None or time - previous[0] > model.settings.max_gap:
         interrupt(state)  # before the servos move on
-        if state.controls.states is not None:
-            state.controls.states.follow(time, row[model.layout.deflections])
+        _follow(state, time, sample, (), row[OFFSET])
         sampled_transform.begin_at(state.transform, time, row)
         begin_segment(state)
         return
@@ -196,9 +195,7 @@ def _append(state: EstimatorState, time: float, sample: Sequence[float], excess:
     extra = [row[OFFSET] * excess[i] for i in model.sample.timed] if excess else ()
     if extra:
         gain += [inputs.step * part for part in extra]
-    servos = state.controls.states
-    if servos is not None:
-        servos.follow(time, row[model.layout.deflections], extra)
+    _follow(state, time, sample, excess, row[OFFSET])
     sampled_transform.append(state.transform, time, row, gain)
     state.segment.samples += 1
     state.segment.intervals += sample[INTERVAL]
@@ -218,12 +215,22 @@ def _without_excess(model: EstimatorModel, sample: Sequence[float]) -> tuple[Seq
 def _follow_uncounted(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
     """Let the servos follow a sample that does not count, so that they are where they are when samples begin to."""
     V, density = sample[AIRSPEED], sample[DENSITY]
-    controls = [sample[len(SAMPLE_COLUMNS) + i] for i in state.model.sample.timed]
-    servos = state.controls.states
-    if servos is not None and math.isfinite(V * density * math.fsum(controls)):
+    if math.isfinite(V * density * math.fsum(_controls(state, sample))):
         reference = state.model.aircraft.reference
-        k = density * V * V / (reference.air_density * reference.airspeed**2)
-        servos.follow(time, [k * control for control in controls])
+        _follow(state, time, sample, (), density * V * V / (reference.air_density * reference.airspeed**2))
+
+
+def _controls(state: EstimatorState, sample: Sequence[float]) -> list[float]:
+    """The sample's controls, in the layout's order."""
+    return [sample[len(SAMPLE_COLUMNS) + i] for i in state.model.sample.timed]
+
+
+def _follow(state: EstimatorState, time: float, sample: Sequence[float], excess: Sequence[float], scale: float) -> None:
+    """Let the servos follow the sample's controls and their excess; ``scale`` is the dynamic pressure's k."""
+    servos = state.controls.states
+    if servos is not None:
+        extra = [excess[i] for i in state.model.sample.timed] if excess else ()
+        servos.follow(time, _controls(state, sample), extra, scale)
 
 
 def renew_early(state: EstimatorState) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sysid_node.online.frequency import fourier_transform
 from sysid_node.online.frequency.fourier_transform import Transform
-from sysid_node.online.frequency.regression_signals import OUTPUTS, SignalLayout
+from sysid_node.online.frequency.regression_signals import OFFSET, OUTPUTS, SignalLayout
 
 Array = NDArray[np.float64]
 MOST_WAITING = 2 * fourier_transform.BLOCK  # samples
@@ -81,8 +81,9 @@ def transform_waiting(state: SampledTransform) -> None:
 def over_intervals(layout: SignalLayout, steps: Array, rows: Array, gains: Array) -> tuple[Array, Array]:
     """Areas and slants (n, T) of the signals ``rows`` (n + 1, T) over ``steps`` (n, 1) s; see ``fourier_transform``.
 
-    ``gains`` (n, 6) are added to the coefficients' areas, (n, m) behind them to those of the controls. The area of a
-    control's rate is the control's increment.
+    ``gains`` (n, 6) are added to the coefficients' areas, (n, m) behind them to those of the controls. The signal of a
+    control is k times the control, and that of its rate k times the rate: a servo acts on the control alone, and the
+    rate of the product would add the rate of k to its response. Its area is the mean k times the control's increment.
     """
     before, after = rows[:-1], rows[1:]
     slants = after - before
@@ -90,7 +91,9 @@ def over_intervals(layout: SignalLayout, steps: Array, rows: Array, gains: Array
     areas[:, :OUTPUTS] += gains[:, :OUTPUTS]
     if gains.shape[1] > OUTPUTS:
         areas[:, layout.deflections] += gains[:, OUTPUTS:]
-    areas[:, layout.rates] = slants[:, layout.deflections]
+    controls, pressure = layout.deflections, slice(OFFSET, OFFSET + 1)
+    increments = after[:, controls] / after[:, pressure] - before[:, controls] / before[:, pressure]
+    areas[:, layout.rates] = 0.5 * (before[:, pressure] + after[:, pressure]) * increments
     slants *= 0.5 * steps * steps
     if gains.shape[1] > OUTPUTS:
         # the rate's first moment about the interval's middle, in units of which a slant is six

@@ -2,7 +2,8 @@
 
 With a servo of lateness L behind the recorded control x, its position p follows L dp/dt + p = x. The transform of p
 over a stretch that ends at t is X + g R (see ``servo_model``), where R is the transform of dx/dt less the impulse
-(x - p) at t, and plus that at the stretch's beginning.
+(x - p) at t, and plus that at the stretch's beginning. The signals are these times k, the dynamic pressure over its
+reference value, and so are the impulses.
 """
 
 from __future__ import annotations
@@ -31,27 +32,30 @@ class ServoStates:
     positions: list[float] = field(default_factory=list)
     controls: Sequence[float] = ()
     time: float = -math.inf  # s, of the last sample
-    #: Time, controls and excess of the last ``REMEMBERED`` s, oldest first.
-    recent: deque[tuple[float, Sequence[float], Sequence[float]]] = field(default_factory=deque)
+    scale: float = 1.0  # k of the last sample
+    #: Time, controls, excess and k of the last ``REMEMBERED`` s, oldest first.
+    recent: deque[tuple[float, Sequence[float], Sequence[float], float]] = field(default_factory=deque)
 
     def copy(self) -> ServoStates:
         """The same, which stays as it is."""
-        return ServoStates(list(self.lateness), list(self.positions), self.controls, self.time, deque(self.recent))
+        return ServoStates(
+            list(self.lateness), list(self.positions), self.controls, self.time, self.scale, deque(self.recent)
+        )
 
     def moved(self, lateness: list[float]) -> ServoStates:
         """Where servos with another ``lateness`` (m,) s would be, having followed the same controls."""
         other = ServoStates(lateness)
-        for time, controls, excess in self.recent:
-            other.follow(time, controls, excess)
+        for sample in self.recent:
+            other.follow(*sample)
         return other
 
-    def follow(self, time: float, controls: Sequence[float], excess: Sequence[float] = ()) -> None:
+    def follow(self, time: float, controls: Sequence[float], excess: Sequence[float] = (), scale: float = 1.0) -> None:
         """Follow the controls, which go in straight lines to these values at ``time`` (s), but for an ``excess`` (m,)
-        in the mean. At first, and after a gap of more than ``LONGEST`` s, servos are at rest there.
+        in the mean. At first, and after a gap of more than ``LONGEST`` s, servos are at rest there. ``scale``: k.
         """
-        step, self.time = time - self.time, time
+        step, self.time, self.scale = time - self.time, time, scale
         recent = self.recent
-        recent.append((time, controls, excess))
+        recent.append((time, controls, excess, scale))
         while recent[0][0] < time - REMEMBERED:
             recent.popleft()
         if not 0.0 < step <= LONGEST:
@@ -69,9 +73,10 @@ class ServoStates:
         self.controls = controls
 
     def impulses(self, omega: Array, time: float) -> Array:
-        """(2F + 1, m) what p - x of the servos at ``time`` (s) is in the transform."""
+        """(2F + 1, m) what k (p - x) of the servos at ``time`` (s) is in the transform."""
         if not self.controls:
             return np.zeros((2 * omega.size + 1, len(self.lateness)))
-        behind = [position - control for position, control in zip(self.positions, self.controls, strict=True)]
+        pairs = zip(self.positions, self.controls, strict=True)
+        behind = [self.scale * (position - control) for position, control in pairs]
         wave = np.exp((-1j * time) * omega)
         return np.asarray(np.multiply.outer(np.concatenate([wave.real, wave.imag, _ONE]), behind))
