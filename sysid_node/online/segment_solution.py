@@ -254,7 +254,14 @@ def _systematic(
     found = yield from estimation.systematic_errors(
         imperfect,
         servos,
-        CorrectedSolution(equations, corrected.solution, corrected.spread, corrected.inflation, correction),
+        CorrectedSolution(
+            equations,
+            corrected.solution,
+            corrected.spread,
+            corrected.inflation,
+            correction,
+            None if corrected.noise is None else line_seconds(state, signals.information) * corrected.noise,
+        ),
         signals,
         state.finished.pieces,
         1.0 if share is None else share,

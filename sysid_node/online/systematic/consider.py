@@ -17,7 +17,9 @@ V are the instruments of X. P projects on all that is exogenous: the controls, t
 keeps of them nevertheless is taken out of both sums (``many_instruments``). If the exogenous signals explain more of a
 residual than they would of noise (the J of Hansen, Econometrica 50, 1982), something moves with the controls that is
 not in the model. The noise then counts as so much larger (Birge, Phys. Rev. 40, 1932), here and in the statistical
-errors. Where X are their own instruments, they count as exogenous. w_c is one over the noise's energy per unit of the
+errors. Where X are their own instruments, their noise is in the Gram matrix of the normal equations, and its expected
+part is subtracted (``regressor_noise``), as it was for theta(0): with it, a servo would seem faster where the vane's
+noise makes an aircraft seem less stable. w_c is one over the noise's energy per unit of the
 Gram matrix. All of it follows from the Gram matrix of the signals and their rates (``corrected_signals``).
 
 The signals are those that are corrected for the estimates so far, and kappa is estimated again with every look: this is
@@ -147,16 +149,18 @@ def consider(
     place: NDArray[np.intp],
     beliefs: Beliefs,
     freedom: Array,
+    of_regressors: Array | None = None,
 ) -> Generator[None, None, Considered]:
     """From the corrected ``signals`` and their ``solution``; ``noise`` (C,) is per unit of the Gram matrix.
 
     ``place`` (W,): where the columns of the regression stand among the signals. ``freedom`` (C,) are the noise's
-    degrees of freedom. It is made in two steps (``state.Steps``).
+    degrees of freedom. ``of_regressors`` (W, W): the Gram matrix of the regressors' noise that the ``solution`` was
+    freed of. It is made in two steps (``state.Steps``).
     """
     sigmas = beliefs.sigmas
-    of_each = _sensitivities(equations, solution, signals, place, sigmas)
+    of_each = _sensitivities(equations, solution, signals, place, sigmas, of_regressors)
     yield
-    found = _findings(equations, of_each.residuals, noise, signals, place, freedom)
+    found = _findings(equations, of_each.residuals, noise, signals, place, freedom, freed=of_regressors is not None)
     off = (beliefs.centre - signals.estimate) / sigmas
     step, covariance = _posterior(*found.scores.weighed(), off, beliefs.precision)
     jacobian = _jacobian(equations, signals.changes, of_each.v, of_each.J, sigmas, signals.corrected_means)
@@ -176,6 +180,7 @@ def _sensitivities(
     signals: CorrectedSignals,
     place: NDArray[np.intp],
     sigmas: Array,
+    of_regressors: Array | None,
 ) -> _Sensitivities:
     """What the imperfections change of the slopes and the residuals, per tolerance."""
     structure, gram, changes = equations.structure, signals.gram, signals.changes
@@ -187,6 +192,10 @@ def _sensitivities(
     Z = np.ascontiguousarray((v.T @ changes.signals).swapaxes(0, 1)) * sigmas[:, None]
     Z = Z @ _by_the_model(equations, solution, place, signals)
     across = V @ gram
+    if of_regressors is not None and not equations.instrumented.all():
+        expected = np.zeros_like(gram)
+        expected[np.ix_(place, place)] = of_regressors
+        across -= V @ expected
     normal = (across @ X.T) * structure.same_block
     inverse = np.linalg.inv(normal + structure.unit * (RIDGE * np.abs(normal.diagonal()) + TINY))
     J = inverse @ (across @ Z.swapaxes(1, 2) * structure.belongs.T[:, :, None])  # (C, P, K)
@@ -204,14 +213,19 @@ def _findings(
     signals: CorrectedSignals,
     place: NDArray[np.intp],
     freedom: Array,
+    *,
+    freed: bool,
 ) -> _Findings:
-    """What the exogenous signals find in the ``residuals`` (C, K + 1, 2N) and their changes."""
+    """What the exogenous signals find in the ``residuals`` (C, K + 1, 2N) and their changes.
+
+    Regressors that are their own instruments are exogenous where the solution was not ``freed`` of their noise.
+    """
     structure, gram = equations.structure, signals.gram
     C = len(structure.coefficients)
     scores, misfit, explained = Scores.none(residuals.shape[1] - 1), np.ones(C), np.zeros(C)
     moves = gram.diagonal()[place[equations.outputs]] > STILL**2 * signals.information.energy
     for block in range(int(structure.block.max()) + 1):
-        project = _projection(equations, signals.changes, place, gram, block)
+        project = _projection(equations, signals.changes, place, gram, block, freed=freed)
         for c in np.flatnonzero((structure.block == block) & (noise > 0.0) & moves).tolist():
             q, D = project @ residuals[c].T, residuals[c, :-1]
             further = project.shape[0] - int(structure.belongs[:, c].sum())  # than the unknowns take
@@ -263,7 +277,13 @@ def _predict_outputs(
 
 
 def _projection(
-    equations: NormalEquations, changes: ColumnChanges, place: NDArray[np.intp], gram: Array, block: int
+    equations: NormalEquations,
+    changes: ColumnChanges,
+    place: NDArray[np.intp],
+    gram: Array,
+    block: int,
+    *,
+    freed: bool,
 ) -> Array:
     """(E, 2N) whose product with a combination of signals and rates has the norm of its exogenous part."""
     columns, of_block = changes.columns, equations.structure.group == block
@@ -274,7 +294,7 @@ def _projection(
     exogenous += range(made.start, made.stop)
     chosen[exogenous] = True
     chosen[N:] = chosen[:N]
-    unknowns = of_block & (equations.columns == equations.instruments)
+    unknowns = of_block & (equations.columns == equations.instruments) & (not freed)
     chosen[place[equations.columns[unknowns]]] = True
     at = np.flatnonzero(chosen & (gram.diagonal() > TINY))
     scale = 1.0 / np.sqrt(gram.diagonal()[at])

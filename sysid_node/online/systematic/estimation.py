@@ -89,6 +89,7 @@ class CorrectedSolution:
         Array  # (C,) factors of the statistical variances, which hold for what the flight tells of imperfections too
     )
     correction: Array  # (C, P + 1) by which the solution differs from that of the recorded signals
+    of_regressors: Array | None  # (W, W) Gram matrix of the regressors' noise that it was freed of
 
 
 def systematic_errors(
@@ -108,7 +109,16 @@ def systematic_errors(
     equations, spread = solved.equations, solved.spread
     beliefs = Beliefs(*prior(imperfect, servos), imperfect.precision)
     noise = solved.inflation * noise_per_gram(equations, spread, signals.information)
-    found = yield from consider(equations, solved.solution, noise, signals, imperfect.places, beliefs, spread.freedom)
+    found = yield from consider(
+        equations,
+        solved.solution,
+        noise,
+        signals,
+        imperfect.places,
+        beliefs,
+        spread.freedom,
+        solved.of_regressors,
+    )
     share = min(share, LARGEST_STEP / max(float(np.abs(found.step[imperfect.servos]).max(initial=0.0)), LARGEST_STEP))
     found = found.shortened(share)
     for rival in rivals:
