@@ -1,0 +1,57 @@
+"""Servos and derivatives from commands in flights of this package's simulator; truth: what was flown.
+
+``kestrel`` pitches as fast as its servo moves, and its airspeed changes by a fifth during a pulse: where the flow's
+noise, or the dynamic pressure's rate, is taken for the servo's, elevator and damping exchange their times.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.excite.spec import parse_manoeuvre
+from sysid_node.online.alignment.in_pieces import align_streams
+from sysid_node.online.replay import run
+from sysid_node.online.settings import OnlineSettings
+from sysid_node.online.types import Estimates
+from sysid_node.sim import Simulator
+from sysid_node.sim.flying.recording import FlightSampler
+from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
+
+LATE = 0.05  # s, of first order; the aircraft file does not say so
+KESTREL = load_aircraft("kestrel")
+
+
+def estimated(noise: float, method: str, seed: int) -> Estimates:
+    """The estimates at the end of three 3-2-1-1s on each surface, with so many times the file's noise."""
+    simulator = Simulator(KESTREL, 400.0)
+    plan = parse_manoeuvre(("3211:repeat=3",), KESTREL, simulator.rate, None)
+    moves = np.column_stack([plan.surfaces(), np.zeros(plan.time.size)])
+    flown = SortieConditions([f"actuator_lag:time_constant={LATE}"], seed=seed, noise=noise, command_rate=100.0)
+    streams = FlightSampler(200.0, 100.0, 100.0, surfaces="commanded").record(fly_sortie(simulator, moves, flown))
+    belief = replace(KESTREL, noise={name: noise * sigma for name, sigma in KESTREL.noise.items()})
+    settings = OnlineSettings(method=method)
+    aligned = align_streams(belief, streams, settings.max_gap, "commands")
+    return run(belief, settings, aligned.time, aligned.samples, aligned.time[-1:], commands_from=0)[-1]
+
+
+def test_with_little_noise_servos_and_derivatives_are_those_flown() -> None:
+    """Without tolerances in the way of it: the estimates themselves, in shares of the truth."""
+    found = estimated(0.1, "iv_rft", 1)
+    for servo in found.servos.values():
+        assert servo.value == pytest.approx(LATE, abs=0.012)
+    for name in ("CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da"):
+        truth = KESTREL.derivatives[name].value
+        assert found.derivatives[name].value == pytest.approx(truth, rel=0.15), name
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_with_the_usual_noise_intervals_hold(seed: int) -> None:
+    """By the default method. Least squares takes the autopilot's answers to the vanes' noise for manoeuvres."""
+    found = estimated(1.0, "iv_rft", seed)
+    for servo in found.servos.values():
+        assert abs(servo.value - LATE) < 2.6 * servo.standard_error  # 99 %
+    for name in ("CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_dr"):
+        d, truth = found.derivatives[name], KESTREL.derivatives[name].value
+        assert abs(d.value - truth) < 2.6 * d.standard_error, name
