@@ -97,7 +97,7 @@ def test_a_node_that_ends_takes_the_others_along(actions: list[Kept]) -> None:
 def test_arguments_with_few_values_have_choices(actions: list[Kept]) -> None:
     declared = {one.words[0]: one.given for one in actions if one.kind == "DeclareLaunchArgument"}
     for name, given in declared.items():
-        closed = name in ("adapt", "method", "turbulence", "use_sim_time", "autopilot")
+        closed = name in ("adapt", "method", "surfaces", "turbulence", "use_sim_time", "autopilot")
         assert ("choices" in given) == closed, name
         if closed:
             assert given["default_value"] in given["choices"]
