@@ -260,7 +260,7 @@ def _systematic(
             corrected.spread,
             corrected.inflation,
             correction,
-            None if corrected.noise is None else line_seconds(state, signals.information) * corrected.noise,
+            _noise_of_regressors(state, signals, corrected.noise),
         ),
         signals,
         state.finished.pieces,
@@ -268,6 +268,16 @@ def _systematic(
         tuple(state.search.rivals.values()),
     )
     return found
+
+
+def _noise_of_regressors(state: EstimatorState, signals: CorrectedSignals, noise: Array | None) -> Array | None:
+    """(W, W) Gram matrix of the regressors' ``noise``, where instruments are too weak to be used.
+
+    Without any instruments, deflections alone would tell too little of the servos; the noise is then left in.
+    """
+    if noise is None or state.model.equations.least_squares:
+        return None
+    return line_seconds(state, signals.information) * noise
 
 
 def _solve(
