@@ -6,6 +6,7 @@ import pytest
 
 from bench.withheld.jsbsim import scoring
 from bench.withheld.jsbsim.drawing import draw, draw_withheld
+from bench.withheld.jsbsim.reality import Servo
 from sysid_node.aircraft.load import load_aircraft
 
 
@@ -20,6 +21,14 @@ def test_a_case_is_its_seeds():
         assert withheld == draw_withheld("final", case, kestrel)
         assert len(withheld.effects) == {"none": 0, "unlisted": 0, "two": 2}.get(case.kind, 1)
         assert len(withheld.unlisted) == (case.kind == "unlisted")
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.01, 0.0126])
+def test_a_servo_is_late_by_its_delay_and_no_more(delay):
+    """Of a step at 400 Hz the area that is lacking is the delay; a fraction of a sample is shared by two."""
+    step = 0.0025
+    servo = Servo({"command_delay": delay}, 0.0, step)
+    assert step * sum(1.0 - servo.move(1.0) for _ in range(12)) == pytest.approx(delay, abs=1e-12)
 
 
 def _case(kind, true, *causes, verdict="explained"):
