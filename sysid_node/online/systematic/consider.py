@@ -17,10 +17,11 @@ V are the instruments of X. P projects on all that is exogenous: the controls, t
 keeps of them nevertheless is taken out of both sums (``many_instruments``). If the exogenous signals explain more of a
 residual than they would of noise (the J of Hansen, Econometrica 50, 1982), something moves with the controls that is
 not in the model. The noise then counts as so much larger (Birge, Phys. Rev. 40, 1932), here and in the statistical
-errors. Where X are their own instruments, their noise is in the Gram matrix of the normal equations, and its expected
-part is subtracted (``regressor_noise``), as it was for theta(0): with it, a servo would seem faster where the vane's
-noise makes an aircraft seem less stable. w_c is one over the noise's energy per unit of the
-Gram matrix. All of it follows from the Gram matrix of the signals and their rates (``corrected_signals``).
+errors. Where instruments are weak, X are their own. The expected part of their noise is then subtracted from the
+normal equations (``regressor_noise``), as it was for theta(0): otherwise a servo would seem faster, because the vane's
+noise makes an aircraft seem less stable. Without any instruments X count as exogenous. w_c is one over
+the noise's energy per unit of the Gram matrix. All of it follows from the Gram matrix of the signals and their rates
+(``corrected_signals``).
 
 The signals are those that are corrected for the estimates so far, and kappa is estimated again with every look: this is
 the Gauss-Newton method. In Z_c, angular accelerations are those of the model's moments: as measured, they hold the
@@ -149,18 +150,18 @@ def consider(
     place: NDArray[np.intp],
     beliefs: Beliefs,
     freedom: Array,
-    of_regressors: Array | None = None,
+    noise_gram: Array | None = None,
 ) -> Generator[None, None, Considered]:
     """From the corrected ``signals`` and their ``solution``; ``noise`` (C,) is per unit of the Gram matrix.
 
     ``place`` (W,): where the columns of the regression stand among the signals. ``freedom`` (C,) are the noise's
-    degrees of freedom. ``of_regressors`` (W, W): the Gram matrix of the regressors' noise that the ``solution`` was
+    degrees of freedom. ``noise_gram`` (W, W): the Gram matrix of the regressors' noise that the ``solution`` was
     freed of. It is made in two steps (``state.Steps``).
     """
     sigmas = beliefs.sigmas
-    of_each = _sensitivities(equations, solution, signals, place, sigmas, of_regressors)
+    of_each = _sensitivities(equations, solution, signals, place, sigmas, noise_gram)
     yield
-    found = _findings(equations, of_each.residuals, noise, signals, place, freedom, freed=of_regressors is not None)
+    found = _findings(equations, of_each.residuals, noise, signals, place, freedom, freed=noise_gram is not None)
     off = (beliefs.centre - signals.estimate) / sigmas
     step, covariance = _posterior(*found.scores.weighed(), off, beliefs.precision)
     jacobian = _jacobian(equations, signals.changes, of_each.v, of_each.J, sigmas, signals.corrected_means)
@@ -180,7 +181,7 @@ def _sensitivities(
     signals: CorrectedSignals,
     place: NDArray[np.intp],
     sigmas: Array,
-    of_regressors: Array | None,
+    noise_gram: Array | None,
 ) -> _Sensitivities:
     """What the imperfections change of the slopes and the residuals, per tolerance."""
     structure, gram, changes = equations.structure, signals.gram, signals.changes
@@ -192,9 +193,9 @@ def _sensitivities(
     Z = np.ascontiguousarray((v.T @ changes.signals).swapaxes(0, 1)) * sigmas[:, None]
     Z = Z @ _by_the_model(equations, solution, place, signals)
     across = V @ gram
-    if of_regressors is not None and not equations.instrumented.all():
+    if noise_gram is not None and not equations.instrumented.all():
         expected = np.zeros_like(gram)
-        expected[np.ix_(place, place)] = of_regressors
+        expected[np.ix_(place, place)] = noise_gram
         across -= V @ expected
     normal = (across @ X.T) * structure.same_block
     inverse = np.linalg.inv(normal + structure.unit * (RIDGE * np.abs(normal.diagonal()) + TINY))

@@ -89,7 +89,7 @@ class CorrectedSolution:
         Array  # (C,) factors of the statistical variances, which hold for what the flight tells of imperfections too
     )
     correction: Array  # (C, P + 1) by which the solution differs from that of the recorded signals
-    of_regressors: Array | None  # (W, W) Gram matrix of the regressors' noise that it was freed of
+    noise_gram: Array | None  # (W, W) Gram matrix of the regressors' noise that it was freed of
 
 
 def systematic_errors(
@@ -117,7 +117,7 @@ def systematic_errors(
         imperfect.places,
         beliefs,
         spread.freedom,
-        solved.of_regressors,
+        solved.noise_gram,
     )
     share = min(share, LARGEST_STEP / max(float(np.abs(found.step[imperfect.servos]).max(initial=0.0)), LARGEST_STEP))
     found = found.shortened(share)
