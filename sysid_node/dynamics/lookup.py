@@ -35,23 +35,55 @@ def pack(tables: Sequence[tuple[Sequence[ArrayLike], ArrayLike]]) -> PackedTable
     return PackedTables(np.array(rows), np.array(columns), np.array(values))
 
 
+class Interpolation(NamedTuple):
+    """Values (..., T) of T tables, and their slopes (..., T) with the first and with the second variable.
+
+    The slopes are those of the interval in which a variable lies, and zero beyond the ends.
+    """
+
+    values: Real
+    by_first: Real
+    by_second: Real
+
+
 def interpolate(tables: PackedTables, first: Real, second: Real, xp: Namespace) -> Real:
     """The tables' values (..., T) at their first and second variables (..., T); bilinear between the points."""
-    i, a = _interval(tables.rows, first, xp)
-    j, b = _interval(tables.columns, second, xp)
+    return interpolate_with_slopes(tables, first, second, xp).values
+
+
+def interpolate_with_slopes(tables: PackedTables, first: Real, second: Real, xp: Namespace) -> Interpolation:
+    """The same with the slopes."""
+    rows, columns = _interval(tables.rows, first, xp), _interval(tables.columns, second, xp)
     count, n, m = tables.values.shape
-    flat, corner = tables.values.reshape(-1), (np.arange(count) * n + i) * m + j
-    low = (1.0 - b) * flat[corner] + b * flat[corner + 1]
-    high = (1.0 - b) * flat[corner + m] + b * flat[corner + m + 1]
-    return (1.0 - a) * low + a * high
+    flat, corner = tables.values.reshape(-1), (np.arange(count) * n + rows.index) * m + columns.index
+    (near_low, near_high), (far_low, far_high) = ((flat[k], flat[k + 1]) for k in (corner, corner + m))
+    a, b = rows.share, columns.share
+    low, high = (1.0 - b) * near_low + b * near_high, (1.0 - b) * far_low + b * far_high
+    across = (1.0 - a) * (near_high - near_low) + a * (far_high - far_low)
+    return Interpolation((1.0 - a) * low + a * high, (high - low) * rows.slope, across * columns.slope)
 
 
-def _interval(points: Real, x: Real, xp: Namespace) -> tuple[Real, Real]:
-    """The interval (..., T) of each table's points (T, n) in which x (..., T) lies, and the share of it, 0 to 1."""
-    index = (points[:, 1:-1] <= x[..., None]).sum(-1)
-    table = np.arange(points.shape[0])
+class _Interval(NamedTuple):
+    """Where a variable lies in each table's points."""
+
+    index: Real  # (..., T) of the point before it
+    share: Real  # (..., T) of the interval that lies before it, 0 to 1
+    slope: Real  # (..., T) of the share
+
+
+def _interval(points: Real, x: Real, xp: Namespace) -> _Interval:
+    """Where x (..., T) lies in points (T, n).
+
+    By bisection: a compiled program would compare x with all points anew wherever the interval is used.
+    """
+    table, last = np.arange(points.shape[0]), points.shape[1] - 2
+    index, step = xp.zeros(x.shape, dtype=int), 1 << last.bit_length()
+    while step := step // 2:
+        ahead = xp.minimum(index + step, last)
+        index = xp.where(points[table, ahead] <= x, ahead, index)
     low, high = points[table, index], points[table, index + 1]
-    return index, xp.clip((x - low) / (high - low), 0.0, 1.0)
+    share = (x - low) / (high - low)
+    return _Interval(index, xp.clip(share, 0.0, 1.0), ((x >= low) & (x <= high)) / (high - low))
 
 
 def _two_dimensional(points: Sequence[ArrayLike], values: ArrayLike) -> tuple[Any, Any, Any]:

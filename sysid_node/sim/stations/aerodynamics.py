@@ -8,7 +8,6 @@ from sysid_node.dynamics.airflow import stability_axes
 from sysid_node.dynamics.atmosphere import speed_of_sound
 from sysid_node.dynamics.coefficients import Coefficients, linear_coefficient, regressors, with_polar
 from sysid_node.dynamics.forces import force_and_moment
-from sysid_node.dynamics.lookup import PackedTables, interpolate
 from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import (
     control_nonlinearity,
@@ -23,6 +22,7 @@ from sysid_node.sim.effects import (
 )
 from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar, Values
 from sysid_node.sim.stations.airflow import Air
+from sysid_node.sim.stations.table_increments import table_increments
 
 
 def deflections(
@@ -69,7 +69,7 @@ def coefficients(
     derivative = dict(zip(layout.derivatives, model.derivatives, strict=True))
     error = effects["derivative_error"]
 
-    added = looked_up(layout, model, x)
+    added = table_increments(layout, model, x)
 
     def linear(coefficient: str) -> Scalar:
         terms = ((derivative[name] + error[name], regressor) for name, regressor in layout.terms(coefficient))
@@ -98,23 +98,6 @@ def coefficients(
         + ground_effect.pitching_moment(effects["ground_effect"], ground, CL),
         Cn=linear("Cn") + Cn_0 + lateral_alpha_coupling.yawing_moment(coupling, alpha, x["beta"]),
     )
-
-
-def looked_up(layout: ParameterLayout, model: AircraftNumbers, x: dict[str, Scalar]) -> dict[str, Scalar]:
-    """What the aircraft file's lookup tables add to each coefficient that has any; ``x`` are the regressors."""
-    if not isinstance(model.tables, PackedTables):
-        return {}
-    variables = sorted({variable for _, over in layout.tables for variable in over})
-    series = [x[name] * model.airspeed if name == "V" else x[name] for name in variables]
-    columns = jnp.stack(jnp.broadcast_arrays(*series), -1)
-    places = [[variables.index(over[0]), variables.index(over[-1])] for _, over in layout.tables]
-    first, second = (columns[..., [place[k] for place in places]] for k in (0, 1))
-    values = interpolate(model.tables, first, second, jnp)
-    owners = [coefficient for coefficient, _ in layout.tables]
-    return {
-        name: values[..., [i for i, owner in enumerate(owners) if owner == name]].sum(-1)
-        for name in dict.fromkeys(owners)
-    }
 
 
 def of_alpha_rate(model: AircraftNumbers, effects: dict[str, Values], air: Air, rate: Scalar) -> Coefficients:
