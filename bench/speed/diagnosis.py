@@ -62,9 +62,9 @@ def _measured(folder: Path, repeat: int) -> str:
     return f"{table(heads, rows)}\n\n{os.cpu_count()} processors; medians of {repeat}. {share}"
 
 
-def flown(bag: Path, seed: int, flight: Sequence[str] = _FLIGHT) -> Path:
+def flown(bag: Path, seed: int, flight: Sequence[str] = _FLIGHT, aircraft: str = _AIRCRAFT) -> Path:
     """A simulated flight, by the arguments of ``sysid simulate``."""
-    words = [*_SYSID, "simulate", "--aircraft", _AIRCRAFT, *flight, "--seed", str(seed), "--out", str(bag), "--quiet"]
+    words = [*_SYSID, "simulate", "--aircraft", aircraft, *flight, "--seed", str(seed), "--out", str(bag), "--quiet"]
     subprocess.run(words, check=True, capture_output=True)
     return bag
 
