@@ -120,7 +120,7 @@ def estimated(method: str, aircraft: Aircraft, streams: Streams, carried: str) -
         return final.derivatives, final.servos
     record = flight_record(aircraft, streams, 0.2, carried)
     fit = identify(method, aircraft, [record], BatchSettings(actuators=carried)).fit
-    return fit.estimates, fit.servos
+    return fit.estimates, fit.systematic.servos
 
 
 def flown(simulator: Simulator, aircraft: Aircraft, number: int) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rosbags.rosbag2 import Reader
@@ -96,7 +97,7 @@ def deserialise(bag: Path) -> None:
     fields: dict[str, list[tuple[float, ...]]] = {"/imu/data": [], "/air_data": [], "/actuators": []}
     with Reader(bag) as reader:
         for connection, _, raw in reader.messages():
-            m = store.deserialize_cdr(raw, connection.msgtype)
+            m: Any = store.deserialize_cdr(raw, connection.msgtype)
             stamp = m.header.stamp.sec * 1_000_000_000 + m.header.stamp.nanosec
             if connection.topic == "/imu/data":
                 f, w = m.linear_acceleration, m.angular_velocity
