@@ -130,3 +130,26 @@ def test_a_table_for_pandas(replayed, flight):
 def test_mistakes_are_one_line(work, said):
     with pytest.raises(InputError, match=re.escape(said)):
         work()
+
+
+_PROGRAMS = """
+import jax, numpy as np
+from sysid_node.api.compiled_programs import release_compiled_programs
+doubled = jax.jit(lambda x: 2.0 * x)
+print(float(doubled(np.ones(7))[0]), release_compiled_programs(share=1.0), doubled._cache_size())
+print(release_compiled_programs(share=0.0), doubled._cache_size(), float(doubled(np.ones(7))[0]))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="the system does not count a process's memory maps")
+def test_programs_are_given_up_where_a_process_has_too_many():
+    """JAX keeps what it compiles in memory maps, of which Linux allows a process only so many."""
+    said = subprocess.run([sys.executable, "-c", _PROGRAMS], capture_output=True, text=True, check=True).stdout
+    assert said.split() == ["2.0", "False", "1", "True", "0", "2.0"]
+
+
+def test_nothing_is_given_up_where_nothing_was_compiled():
+    words = "from sysid_node.api.compiled_programs import release_compiled_programs as r; import sys; "
+    words += "print(r(share=0.0), 'jax' in sys.modules)"
+    said = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True).stdout
+    assert said.split() == ["False", "False"]

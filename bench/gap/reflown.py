@@ -33,6 +33,7 @@ from bench.withheld.ledger import version
 from bench.withheld.plants.motion import DivergedError
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft, Derivative, UncertainValue
+from sysid_node.api.compiled_programs import release_compiled_programs
 from sysid_node.api.flight_file import load
 from sysid_node.api.gap_diagnosis import GapDiagnosis, diagnose
 from sysid_node.flight.record import Array
@@ -68,6 +69,7 @@ def main() -> None:
             with args.ledger.open("a") as file:
                 file.write(json.dumps(done[seed]) + "\n")
             print(" | ".join(_row(done[seed])), flush=True)
+            release_compiled_programs()
     cases = [case for _, case in sorted(done.items())]
     publish("bench.gap.reflown", _page(cases), args.page)
 

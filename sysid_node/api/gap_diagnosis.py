@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from sysid_node.aircraft.model import Derivative
+from sysid_node.api.compiled_programs import release_compiled_programs
 from sysid_node.api.data_frames import data_frame
 from sysid_node.api.flight_file import FlightFile
 from sysid_node.errors import InputError
@@ -138,6 +139,7 @@ def diagnose(
         for group in (flights, holdout, simulated)
     )
     keep = None if resume is None else Path(resume)
+    release_compiled_programs()
     report = progress or (lambda share, doing: None)
     found = diagnose_flights(aircraft, fitted, held_out, report, keep=keep, simulated=of_simulator)
     if theirs is None:

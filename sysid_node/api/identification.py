@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from sysid_node.api.compiled_programs import release_compiled_programs
 from sysid_node.api.estimated_run import EstimatedRun
 from sysid_node.api.flight_file import FlightFile
 from sysid_node.batch.identify import Identification, refuse_unused
@@ -70,6 +71,7 @@ def identify(
         [flight.aligned(chosen.max_gap, chosen.actuators) for flight in group] for group in (flights, holdout)
     )
     tell(0.2, method.replace("_", " "))
+    release_compiled_programs()
     aircraft = flights[0].aircraft
     found = identify_records(method, aircraft, records, chosen, held_out)
     tell(0.9, "spectra")
