@@ -124,8 +124,7 @@ def move_servos(state: EstimatorState, servos: ServoModel) -> Steps[None]:
     for excited in state.changes.excited:
         segments = [replace(segment, information=found[id(segment.information)]) for segment in excited.segments]
         excited.segments = deque(segments, maxlen=excited.segments.maxlen)
-    # earlier estimates used other columns, so they are no reference any more
-    state.changes.monitor.references.clear()
+    state.changes.monitor.move_columns(state.transform.last)
 
 
 class _SolvedEquations(NamedTuple):
@@ -177,7 +176,7 @@ def solve_all(
         tests=_model_tests(state, found.solution, spread, gram, systematic),
         systematic=systematic,
     )
-    state.changes.monitor.references.append(before)
+    state.changes.monitor.add_reference(before)
 
 
 def _variance_factors(found: _SolvedEquations, recorded: Solution, systematic: SystematicErrors | None) -> Array:

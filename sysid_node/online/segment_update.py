@@ -57,14 +57,16 @@ def _solved(
 ) -> Steps[None]:
     """Solve for everything again, respond to changes, and finish the segment if this is its ``last`` renewal.
 
-    Where servos were moved, earlier estimates are no reference any more. The ``finding`` by these does not count then:
-    the change monitor goes on from ``before`` it.
+    Where servos were moved, what seemed a change can be the servos' time. The last pieces are then examined again, by
+    the change monitor as it was ``before`` the ``finding``.
     """
+    servos = state.controls.servos
     yield from solve_with_servos(state, lines)
     yield from servo_search.try_another_solution(state)
-    tested = any(one.time < state.transform.last for one in state.changes.monitor.references)
-    if finding is not None and not tested:
-        state.changes.monitor, finding = before, before.standing(finding.contradicted.size)
+    if finding is not None and state.controls.servos is not servos:
+        yield
+        state.changes.monitor = before
+        finding = look_for_changes(state)
     if finding is not None:
         yield from respond(state, lines, finding)
     if last:

@@ -128,4 +128,4 @@ def _take(state: EstimatorState, trial: EstimatorState) -> Steps[None]:
         yield from segment_solution.move_servos(state, trial.controls.servos)
     state.equations, state.latest = trial.equations, trial.latest
     state.segment.information = trial.segment.information
-    state.changes.monitor.references.append(trial.changes.monitor.references[-1])
+    state.changes.monitor.add_reference(trial.changes.monitor.references[-1])

@@ -37,7 +37,9 @@ SPANS = (3, 6, 12, 24)  # pieces looked back over
 EVERY = 3  # a span of n times so many pieces is looked at with every n-th piece
 FALSE_ALARM = 1e-9  # a test: an hour has 7200 pieces, times six coefficients and about two spans
 MARGIN = 1.5  # and F must exceed what chance allows by this factor: no model is exact
-DOUBT = 1e-2  # chance under which a span casts doubt
+#: Chance under which a test casts doubt. Each test of a coefficient, of the spans and by well-excited flight, is made at
+#: its share of one in a hundred (Bonferroni), so that all of them together cast doubt by chance no more often.
+DOUBT = 1e-2 / (len(SPANS) + 1)
 KNOWN = 12.0  # degrees of freedom that the earlier estimates must rest on
 LOST = 0.25  # share of the motion's energy left unexplained beyond which the model does not hold
 NOISE_RATIO = 9.0  # and by how much the residual must stand above its usual density
@@ -60,13 +62,34 @@ class ChangeMonitor:
     outside_model: Flags | None = None  # (C,)
     contradicted_by_excited: Flags | None = None  # (C,) by what was learned in well-excited flight
     examinations: int = 0
+    with_earlier_columns: ReferenceEstimates | None = None  # the present estimates, before a control's column moved
 
     def before_examination(self) -> ChangeMonitor:
-        """The same with what the next examination finds left out, but for its number; the pieces are shared."""
+        """The same with what the next examination finds left out; pieces and references are shared."""
         typical = deque(self.typical_statistic, maxlen=self.typical_statistic.maxlen)
-        return replace(
-            self, typical_statistic=typical, contradicted=dict(self.contradicted), examinations=self.examinations + 1
-        )
+        return replace(self, typical_statistic=typical, contradicted=dict(self.contradicted))
+
+    def move_columns(self, now: float) -> None:
+        """The controls' columns change at ``now`` (s). Estimates that used others are no reference as they are.
+
+        How the same data change the estimates by it is known when they are next solved for (``add_reference``).
+        """
+        last = self.references.pop() if self.references and self.references[-1].time == now else None
+        self.with_earlier_columns = last
+        if last is None:
+            self.references.clear()
+
+    def add_reference(self, reference: ReferenceEstimates) -> None:
+        """Add the present estimates. Where columns have just changed, all earlier estimates move as these did."""
+        before, self.with_earlier_columns = self.with_earlier_columns, None
+        if before is not None and before.equations is reference.equations:
+            moved = reference.solution.theta - before.solution.theta
+            known = [one.moved(moved) for one in self.references if one.equations is reference.equations]
+            self.references.clear()
+            self.references.extend(known)
+        elif before is not None:
+            self.references.clear()
+        self.references.append(reference)
 
     def standing(self, C: int) -> ChangeDecision:
         """What was found of each of ``C`` coefficients when a span was last looked at."""

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any
 
@@ -49,6 +49,10 @@ class ReferenceEstimates:
     solution: Solution
     uncertainty: Uncertainty
     noise_score: Array | None = None  # (P, C) the score's mean by the sensors' noise, per line and second; None: zero
+
+    def moved(self, by: Array) -> ReferenceEstimates:
+        """The same with estimates that differ ``by`` (P, C)."""
+        return replace(self, solution=replace(self.solution, theta=self.solution.theta + by))
 
     @classmethod
     def stacked(cls, some: Sequence[ReferenceEstimates]) -> ReferenceEstimates:
