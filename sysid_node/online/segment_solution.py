@@ -176,7 +176,17 @@ def solve_all(
         tests=_model_tests(state, found.solution, spread, gram, systematic),
         systematic=systematic,
     )
-    state.changes.monitor.add_reference(before)
+    state.changes.monitor.add_reference(replace(before, time_errors=_time_errors(state, systematic)))
+
+
+def _time_errors(state: EstimatorState, systematic: SystematicErrors | None) -> Array | None:
+    """(P,) standard errors of the times of the controls among the regressors, s; None where all are exact."""
+    imperfect = state.model.imperfections
+    if imperfect is None or systematic is None:
+        return None
+    timed = [state.model.layout.timed[i] for i in imperfect.timed.tolist()]
+    errors = dict(zip(timed, systematic.errors.tolist(), strict=True))
+    return np.array([errors.get(name, 0.0) for name in state.equations.structure.regressors])
 
 
 def _variance_factors(found: _SolvedEquations, recorded: Solution, systematic: SystematicErrors | None) -> Array:

@@ -37,8 +37,8 @@ SPANS = (3, 6, 12, 24)  # pieces looked back over
 EVERY = 3  # a span of n times so many pieces is looked at with every n-th piece
 FALSE_ALARM = 1e-9  # a test: an hour has 7200 pieces, times six coefficients and about two spans
 MARGIN = 1.5  # and F must exceed what chance allows by this factor: no model is exact
-#: Chance under which a test casts doubt. Each test of a coefficient, of the spans and by well-excited flight, is made at
-#: its share of one in a hundred (Bonferroni), so that all of them together cast doubt by chance no more often.
+#: Chance under which a test casts doubt. A coefficient's tests, of the spans and by well-excited flight, share one in a
+#: hundred (Bonferroni), so that all of them together cast doubt by chance no more often.
 DOUBT = 1e-2 / (len(SPANS) + 1)
 KNOWN = 12.0  # degrees of freedom that the earlier estimates must rest on
 LOST = 0.25  # share of the motion's energy left unexplained beyond which the model does not hold
@@ -217,6 +217,7 @@ def _contradicted(tests: ChangeTests, span: int, excited: ExcitedSegments, block
     reference = estimates_of(excited, tests.full, tests.now - tests.memory, start)
     if reference is None or excited.exceeds_all((lines[:, excited.controls] ** 2).sum(axis=0)):
         return False
+    reference = replace(reference, time_errors=tests.change_monitor.references[-1].time_errors)
     found = score_test(reference, lines, tests.spectrum, tests.now - start)
     tested = (tests.full.structure.block == block) & (found.freedom >= KNOWN)
     return bool((found.chance(MARGIN)[tested] < FALSE_ALARM).any())

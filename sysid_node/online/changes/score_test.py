@@ -13,7 +13,8 @@ noise, which the estimates were freed of (``regressor_noise``). The score's mean
 the controls hardly move, it is the largest part of the score. It is taken off, as much of it as brings F down, but no
 more than the file's noise makes: how large the noise is at present is not known better. Over stretches shorter than the
 period of the line spacing Z'KZ is Z'Z over twice that spacing. S is taken by bands, and no less than what no
-derivatives explain of the stretch itself: air that has become rougher is no contradiction either.
+derivatives explain of the stretch itself: air that has become rougher is no contradiction either. Where a servo's time
+is known to a standard error only, what such an error makes of the score is added to its covariance.
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ class ReferenceEstimates:
     solution: Solution
     uncertainty: Uncertainty
     noise_score: Array | None = None  # (P, C) the score's mean by the sensors' noise, per line and second; None: zero
+    time_errors: Array | None = None  # (P,) standard errors of the regressors' times, s; None: all are exact
 
     def moved(self, by: Array) -> ReferenceEstimates:
         """The same with estimates that differ ``by`` (P, C)."""
@@ -60,7 +62,9 @@ class ReferenceEstimates:
         solution = Solution(*_columns([one.solution for one in some]))
         uncertainty = Uncertainty(*_columns([one.uncertainty for one in some]))
         scores = [one.noise_score if one.noise_score is not None else np.zeros_like(one.solution.theta) for one in some]
-        return cls(some[0].time, some[0].equations, solution, uncertainty, np.array(scores))
+        exact = np.zeros(some[0].equations.columns.size)
+        times = [exact if one.time_errors is None else one.time_errors for one in some]
+        return cls(some[0].time, some[0].equations, solution, uncertainty, np.array(scores), np.array(times))
 
 
 def _columns(rows: Sequence[Solution] | Sequence[Uncertainty]) -> Iterator[NDArray[Any]]:
@@ -108,6 +112,8 @@ def score_test(reference: ReferenceEstimates, lines: Array, spectrum: Spectrum, 
     noise *= (density_per_gram * np.maximum(excess, 1.0))[..., None, None]
     G = (regressed.take(equations.instruments, axis=-2) * structure.same_block)[..., None, :, :]
     spread = noise + G @ known.covariance @ G.swapaxes(-1, -2)
+    if reference.time_errors is not None and reference.time_errors.any():
+        spread += _by_times(reference, Z, lines.take(equations.columns, axis=-1), spectrum.omega)
     score = (left_over.take(equations.instruments, axis=-2) * structure.belongs).swapaxes(-1, -2)
     motion = np.maximum(gram.diagonal(axis1=-2, axis2=-1).take(equations.outputs, axis=-1), TINY)
     by_noise = None
@@ -116,6 +122,19 @@ def score_test(reference: ReferenceEstimates, lines: Array, spectrum: Spectrum, 
         by_noise = (amount[..., None] * reference.noise_score).swapaxes(-1, -2)
     statistic = _normalised(equations, spread, score, by_noise) / count
     return ScoreTest(statistic, count, known.freedom, excess, rest / motion)
+
+
+def _by_times(reference: ReferenceEstimates, instruments: Array, regressors: Array, omega: Array) -> Array:
+    """(..., C, P, P) the score's covariance by errors of the regressors' times, which turn their lines (..., 2F, P).
+
+    A regressor that comes dt later is x (1 - i omega dt) to first order.
+    """
+    assert reference.time_errors is not None
+    F = omega.size
+    turned = np.concatenate([regressors[..., F:, :], -regressors[..., :F, :]], axis=-2) * np.tile(omega, 2)[:, None]
+    weight = reference.solution.theta.swapaxes(-1, -2) * reference.time_errors[..., None, :]  # (..., C, P)
+    off: Array = (instruments.swapaxes(-1, -2) @ turned[..., None, :, :]) * weight[..., None, :]
+    return off @ off.swapaxes(-1, -2)
 
 
 def _unexplained(

@@ -88,6 +88,25 @@ def test_the_noise_of_regressors_that_do_not_move_is_no_contradiction() -> None:
     assert (score_test(freed, shifted, SPECTRUM, duration).chance(1.0) < 1e-6).all()
 
 
+def test_what_an_error_of_a_servos_time_explains_is_no_contradiction() -> None:
+    """de is 5 ms later than its lines have it, and alpha is its slope: one standard error makes a score of one."""
+    rng, late, de = np.random.default_rng(3), 0.005, LAYOUT.column("de")
+    lines, P, C = rng.normal(size=(LINES, PLAN.width)), PLAN.columns.size, PLAN.outputs.size
+    theta = np.ones((P, C)) * PLAN.structure.belongs
+    transform = lines[: LINES // 2, de] + 1j * lines[LINES // 2 :, de]
+    slope, later = -1j * SPECTRUM.omega * transform, np.exp(-1j * SPECTRUM.omega * late) * transform
+    lines[:, LAYOUT.column("alpha")] = np.concatenate([slope.real, slope.imag])
+    flown = lines.copy()
+    flown[:, de] = np.concatenate([later.real, later.imag])
+    lines[:, PLAN.outputs] = flown[:, PLAN.columns] @ theta
+    exact = reference(theta, np.zeros((C, P, P)), density=1e-4)
+    told = replace(exact, time_errors=np.where(PLAN.columns == de, late, 0.0))
+    count = PLAN.structure.belongs.sum(axis=0)
+    before, after = (score_test(one, lines, SPECTRUM, 500.0).statistic * count for one in (exact, told))
+    assert before.min() > 50.0
+    assert after.max() < 1.1
+
+
 def test_disagreement_is_the_chance_of_the_difference() -> None:
     """One derivative each differs by d, of variance v on both sides: F = d^2 / (2 v p)."""
     P, C = PLAN.columns.size, PLAN.outputs.size
