@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.cli.main import main
 from sysid_node.flight.align import flight_record
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import write_streams
@@ -60,7 +61,9 @@ class Seeds:
 
 
 def _command(*words: str) -> None:
-    if main([*words, "--quiet"]):
+    """A command in a process of its own: JAX would start threads here, without which a forked case waits for ever."""
+    done = subprocess.run([sys.executable, "-m", "sysid_node.cli", *words, "--quiet"], cwd=ROOT, check=False)
+    if done.returncode:
         raise RuntimeError(f"sysid {words[0]} of sound input does not end well")
 
 
