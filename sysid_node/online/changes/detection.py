@@ -70,9 +70,10 @@ class ChangeMonitor:
         return replace(self, typical_statistic=typical, contradicted=dict(self.contradicted))
 
     def move_columns(self, now: float) -> None:
-        """The controls' columns change at ``now`` (s). Estimates that used others are no reference as they are.
+        """The controls' columns in the equations change at ``now`` (s), because a servo's time does.
 
-        How the same data change the estimates by it is known when they are next solved for (``add_reference``).
+        Earlier estimates were made with the columns before. How far the change moves the present estimates is known
+        when they are solved for again (``add_reference``).
         """
         last = self.references.pop() if self.references and self.references[-1].time == now else None
         self.with_earlier_columns = last
@@ -217,6 +218,7 @@ def _contradicted(tests: ChangeTests, span: int, excited: ExcitedSegments, block
     reference = estimates_of(excited, tests.full, tests.now - tests.memory, start)
     if reference is None or excited.exceeds_all((lines[:, excited.controls] ** 2).sum(axis=0)):
         return False
+    # the servos' times are those of all flight so far, whichever segments the estimates are of
     reference = replace(reference, time_errors=tests.change_monitor.references[-1].time_errors)
     found = score_test(reference, lines, tests.spectrum, tests.now - start)
     tested = (tests.full.structure.block == block) & (found.freedom >= KNOWN)
