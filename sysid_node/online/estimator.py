@@ -43,6 +43,7 @@ from sysid_node.online.state import (
 )
 from sysid_node.online.status import vocabulary
 from sysid_node.online.systematic.imperfections import imperfections
+from sysid_node.online.systematic.rate_limited_moves import RateLimitedMoves
 from sysid_node.online.systematic.servo_states import ServoStates
 from sysid_node.online.types import SAMPLE_COLUMNS
 
@@ -81,6 +82,7 @@ def init(
         ),
         FinishedSegments(information.nothing(layout, grid.count if imperfect else 0)),
         ChangeWatch(no_excited_segments(equations, layout)),
+        RateLimitedMoves.of(aircraft, layout.timed) if commanded and imperfect else None,
     )
 
 
@@ -230,7 +232,10 @@ def _follow(state: EstimatorState, time: float, sample: Sequence[float], excess:
     servos = state.controls.states
     if servos is not None:
         extra = [excess[i] for i in state.model.sample.timed] if excess else ()
-        servos.follow(time, _controls(state, sample), extra, scale)
+        controls, step = _controls(state, sample), time - servos.time
+        if state.rate_limited is not None and 0.0 < step <= state.model.settings.max_gap:
+            state.rate_limited.follow(step, servos.controls, controls)
+        servos.follow(time, controls, extra, scale)
 
 
 def renew_early(state: EstimatorState) -> None:

@@ -28,6 +28,7 @@ def begin(state: EstimatorState, whole: bool, work: Callable[[EstimatorState], S
         transform=at_rest,
         segment=replace(segment),
         controls=controls if servos is None else replace(controls, states=servos.copy()),
+        rate_limited=state.rate_limited.copy() if state.rate_limited else None,
     )
     lines = sampled_transform.current(at_rest)
     counts = segment.samples, segment.intervals

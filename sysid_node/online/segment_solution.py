@@ -260,8 +260,9 @@ def _systematic(
     last = last_errors(state)
     if share is None and last is not None and last.holds(state.finished.pieces, servos, signals.information.energy):
         return replace(last, correction=correction)
+    limits = state.rate_limited
     found = yield from estimation.systematic_errors(
-        imperfect,
+        imperfect if limits is None else imperfect.limited(limits.errors()[imperfect.timed]),
         servos,
         CorrectedSolution(
             equations,

@@ -31,6 +31,7 @@ from sysid_node.online.status import Codes, Vocabulary
 from sysid_node.online.systematic.budget import Budget
 from sysid_node.online.systematic.estimation import Rival, SystematicErrors
 from sysid_node.online.systematic.imperfections import Imperfections
+from sysid_node.online.systematic.rate_limited_moves import RateLimitedMoves
 from sysid_node.online.systematic.servo_model import ServoModel
 from sysid_node.online.systematic.servo_states import ServoStates
 from sysid_node.online.types import DerivativeEstimate
@@ -233,6 +234,7 @@ class EstimatorState:
     controls: ControlLines
     finished: FinishedSegments
     changes: ChangeWatch
+    rate_limited: RateLimitedMoves | None = None  # None where no rate limit is stated with a tolerance
     inputs: EstimatorInputs = field(default_factory=EstimatorInputs)
     segment: PresentSegment = field(default_factory=PresentSegment)
     search: ServoSearch = field(default_factory=ServoSearch)

@@ -124,7 +124,7 @@ def _told(state: EstimatorState) -> _OneFlight | None:
     if imperfect is None or latest is None or latest.systematic is None:
         return None
     found, table = latest.systematic, state.model.table
-    sigmas, centre = prior(imperfect, found.lines)
+    sigmas, centre = prior(imperfect.limited(found.limits), found.lines)
     base = _servos_of_lines(imperfect, found)
     inverse = np.linalg.inv(found.considered.covariance / sigmas / sigmas[:, None])
     jacobian = found.considered.jacobian

@@ -62,6 +62,7 @@ class SystematicErrors:
     energy: float  # s: data that it rests on
     known: Known  # what one unit of each imperfection changes
     taken_out: Array  # (K,) of the imperfections, from the signals that it rests on
+    limits: Array  # (m,) s: part of the lateness' tolerance by rate limits, which the flight cannot tell from a lag
     share: float = 1.0  # of the step that was made
 
     def ahead(self, imperfect: Imperfections) -> Flags:
@@ -136,6 +137,7 @@ def systematic_errors(
         signals.information.energy,
         signals.known,
         signals.estimate,
+        imperfect.limits,
         share,
     )
 

@@ -38,6 +38,7 @@ OF_ONE_TYPE = 0.8
 COMPLETE = 0.02 / 0.93
 #: The largest root of a correlation by a shared damping: that of one would have no inverse.
 ALIKE = 0.99
+SMALLEST = 1e-4  # s: 1 sigma of a servo of which only the rate limit is not exactly known
 KNOWN = 0.03  # s: the largest 1 sigma of a servo of which something is known
 SHORTEST = 0.02  # s: the lateness from which on the tolerances of B and of the third coefficient go with it
 
@@ -57,6 +58,7 @@ class Imperfections:
     columns: ServoColumns
     stamps: float  # s: 1 sigma of the lateness of the stamps of controls and motion, against each other
     step_time: float  # s: 1 sigma of the time of steps in a log's commands
+    limits: Array  # (m,) s: 1 sigma of how late the rate limits have made the controls in the flight
     places: Index  # (W,) where the columns of the signal vector stand among them
 
     @cached_property
@@ -64,6 +66,10 @@ class Imperfections:
         """Of each imperfection the key of its tolerance: all of a servo share theirs."""
         servos = tuple(f"actuator_lag.{name}" for name in self.controls)
         return (*(source.key for source in self.sources), *servos, *servos, *servos)
+
+    def limited(self, limits: Array) -> Imperfections:
+        """With another error of the lateness (m,) s that rate limits have caused."""
+        return replace(self, limits=limits, sigmas=np.sqrt(self.sigmas**2 - self.limits**2 + limits**2))
 
     @property
     def servos(self) -> slice:
@@ -104,6 +110,7 @@ def imperfections(
         columns,
         math.hypot(unseen, *(aircraft.tolerances.get(f"delays.{topic}", 0.0) for topic in ("actuators", "imu"))),
         unseen,
+        np.zeros(len(controls)),
         np.array([columns.place(i) for i in range(layout.width)], np.intp),
     )
 
@@ -134,6 +141,8 @@ def _uncertain_servos(
         sigma = math.hypot(sigma, aircraft.tolerances.get(f"command_delay.{name}", 0.0))
         if not commanded:
             sigma = math.hypot(sigma, stated)
+        if f"actuator_rate_limit.{name}" in aircraft.tolerances and commanded:
+            sigma = max(sigma, SMALLEST)  # the flight may make it later by a limit that is not exactly known
         whole = math.hypot(sigma, unseen)
         if whole > 0.0:
             silent = commanded and stated == 0.0 and sigma > KNOWN
@@ -171,13 +180,14 @@ def _time_of_steps(interval: float) -> float:
 
 
 def _precision(sources: int, unknown: Index, damped: Array) -> Array:
-    """(K, K) where the lateness of the ``unknown`` of the m servos has a part in common.
+    """(K, K) where the ``unknown`` of the m servos have a part in common: of lateness, curvature and third coefficient.
 
-    So has that of servos of second order by their damping, which is the share ``damped`` (m,) of their 1 sigma.
+    So has the lateness of servos of second order by their damping, which is the share ``damped`` (m,) of their 1 sigma.
     """
     correlation = np.eye(sources + 3 * damped.size)
-    places = sources + unknown
-    correlation[np.ix_(places, places)] += OF_ONE_TYPE * (1.0 - np.eye(places.size))
+    for order in range(3):
+        places = sources + order * damped.size + unknown
+        correlation[np.ix_(places, places)] += OF_ONE_TYPE * (1.0 - np.eye(places.size))
     alike = np.minimum(damped, ALIKE)
     servos = slice(sources, sources + damped.size)
     correlation[servos, servos] += np.outer(alike, alike) - np.diag(alike**2)

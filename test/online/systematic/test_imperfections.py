@@ -62,3 +62,14 @@ def test_servos_that_only_their_damping_leaves_open_move_together():
     """Their correlation would be one, and has no inverse."""
     correlation = np.linalg.inv(believed(0.0, 0.1).precision)
     assert correlation[0, 1] == pytest.approx(0.99**2)
+
+
+def test_servos_of_which_the_file_is_silent_are_alike():
+    """In lateness, curvature and third coefficient; an aircraft has servos of one type."""
+    aircraft = replace(made_aircraft(), ideal=False)
+    found = imperfections(aircraft, layout(aircraft), commanded=True, positions=False)
+    assert found is not None
+    correlation, first = np.linalg.inv(found.precision), found.servos.start
+    for order in range(3):
+        block = slice(first + 3 * order, first + 3 * order + 3)
+        np.testing.assert_allclose(correlation[block, block], 0.8 + 0.2 * np.eye(3), atol=1e-9)

@@ -46,12 +46,18 @@ def test_with_little_noise_servos_and_derivatives_are_those_flown() -> None:
         assert found.derivatives[name].value == pytest.approx(truth, rel=0.15), name
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_with_the_usual_noise_intervals_hold(seed: int) -> None:
-    """By the default method. Least squares takes the autopilot's answers to the vanes' noise for manoeuvres."""
-    found = estimated(1.0, "iv_rft", seed)
-    for servo in found.servos.values():
-        assert abs(servo.value - LATE) < 2.6 * servo.standard_error  # 99 %
-    for name in ("CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_dr"):
-        d, truth = found.derivatives[name], KESTREL.derivatives[name].value
-        assert abs(d.value - truth) < 2.6 * d.standard_error, name
+def test_with_the_usual_noise_intervals_hold() -> None:
+    """By the default method. Least squares takes the autopilot's answers to the vanes' noise for manoeuvres.
+
+    Of 33 errors at most one is beyond the 99 % of a normal distribution (more in one of 24 sets), and none beyond 3.5.
+    """
+    scores = []
+    for seed in (1, 2, 3):
+        found = estimated(1.0, "iv_rft", seed)
+        scores += [(servo.value - LATE) / servo.standard_error for servo in found.servos.values()]
+        for name in ("CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_dr"):
+            d, truth = found.derivatives[name], KESTREL.derivatives[name].value
+            scores.append((d.value - truth) / d.standard_error)
+    errors = np.sort(np.abs(scores))
+    assert errors[-2] < 2.6
+    assert errors[-1] < 3.5
