@@ -37,6 +37,7 @@ from sysid_node.online.state import (
     Steps,
 )
 from sysid_node.online.systematic import estimation
+from sysid_node.online.systematic.corrected_lines import LineCorrection
 from sysid_node.online.systematic.corrected_signals import CorrectedSignals, corrected_signals, known_changes
 from sysid_node.online.systematic.estimation import CorrectedSolution, SystematicErrors
 from sysid_node.online.systematic.imperfections import line_model, remapped
@@ -154,7 +155,7 @@ def solve_all(
     gram = total.grams.sum(axis=0)
     found = _solved(state, total, gram)
     equations, spread, now = state.equations, found.spread, state.transform.last
-    before = _reference(found, found.solution, spread, equations, now)
+    before = corrected = _reference(found, found.solution, spread, equations, now)
     if signals is not None:
         before = _with_recorded_signals(equations, recorded, found, now)
         yield
@@ -176,7 +177,27 @@ def solve_all(
         tests=_model_tests(state, found.solution, spread, gram, systematic),
         systematic=systematic,
     )
-    state.changes.monitor.add_reference(replace(before, time_errors=_time_errors(state, systematic)))
+    before = replace(before, time_errors=_time_errors(state, systematic))
+    state.changes.monitor.add_reference(_with_corrected(state, before, corrected, signals, systematic))
+
+
+def _with_corrected(
+    state: EstimatorState,
+    recorded: ReferenceEstimates,
+    corrected: ReferenceEstimates,
+    signals: CorrectedSignals | None,
+    systematic: SystematicErrors | None,
+) -> ReferenceEstimates:
+    """The estimates by ``recorded`` signals, and with them those by ``corrected`` ones, where there are such."""
+    imperfect, servos = state.model.imperfections, state.controls.servos
+    if imperfect is None or servos is None or signals is None or systematic is None:
+        return recorded
+    considered = systematic.considered
+    correction = LineCorrection(
+        imperfect, signals.changes, servos, signals.estimate, considered.covariance, considered.jacobian[:, :, :-1]
+    )
+    inflation = None if corrected.inflation is None else corrected.inflation * considered.misfit
+    return replace(recorded, corrected=replace(corrected, correction=correction, inflation=inflation))
 
 
 def _time_errors(state: EstimatorState, systematic: SystematicErrors | None) -> Array | None:
@@ -185,7 +206,7 @@ def _time_errors(state: EstimatorState, systematic: SystematicErrors | None) -> 
     if imperfect is None or systematic is None:
         return None
     timed = [state.model.layout.timed[i] for i in imperfect.timed.tolist()]
-    errors = dict(zip(timed, systematic.errors.tolist(), strict=True))
+    errors = dict(zip(timed, np.hypot(systematic.errors, systematic.limits).tolist(), strict=True))
     return np.array([errors.get(name, 0.0) for name in state.equations.structure.regressors])
 
 
@@ -201,10 +222,7 @@ def _variance_factors(found: _SolvedEquations, recorded: Solution, systematic: S
 def _with_recorded_signals(
     equations: NormalEquations, recorded: Information, found: _SolvedEquations, now: float
 ) -> ReferenceEstimates:
-    """The solution with the signals as they were recorded, which those between renewals and the tests for changes are.
-
-    What is off in the signals is the same before a change and after it.
-    """
+    """The solution with the signals as they were recorded, for estimates between renewals and short stretches."""
     solution = least_squares.solve(equations, recorded.grams.sum(axis=0), found.compensation)
     return _reference(found, solution, least_squares.uncertainty(equations, solution, recorded), equations, now)
 
@@ -214,7 +232,7 @@ def _reference(
 ) -> ReferenceEstimates:
     """What later flight is tested against."""
     noise = None if found.noise is None else regressor_noise.noise_score(equations, solution, found.noise)
-    return ReferenceEstimates(now, equations, solution, spread, noise)
+    return ReferenceEstimates(now, equations, solution, spread, noise, inflation=found.inflation)
 
 
 def _corrected_signals(

@@ -28,12 +28,14 @@ from sysid_node.online.changes.score_test import ReferenceEstimates, ScoreTest, 
 from sysid_node.online.regression.information import Spectrum, clean_lines
 from sysid_node.online.regression.instruments import InstrumentModel
 from sysid_node.online.regression.normal_equations import NormalEquations
+from sysid_node.online.systematic.corrected_lines import CorrectedLines
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 PIECE = 0.5  # s
 SPANS = (3, 6, 12, 24)  # pieces looked back over
+LONG = 12  # pieces from which on a stretch's lines can be corrected: both ends take a line, of the few of a short one
 EVERY = 3  # a span of n times so many pieces is looked at with every n-th piece
 FALSE_ALARM = 1e-9  # a test: an hour has 7200 pieces, times six coefficients and about two spans
 MARGIN = 1.5  # and F must exceed what chance allows by this factor: no model is exact
@@ -84,8 +86,8 @@ class ChangeMonitor:
         """Add the present estimates. Where columns have just changed, all earlier estimates move as these did."""
         before, self.with_earlier_columns = self.with_earlier_columns, None
         if before is not None and before.equations is reference.equations:
-            moved = reference.solution.theta - before.solution.theta
-            known = [one.moved(moved) for one in self.references if one.equations is reference.equations]
+            alike = [one for one in self.references if one.equations is reference.equations]
+            known = [one.moved_as(before, reference) for one in alike]
             self.references.clear()
             self.references.extend(known)
         elif before is not None:
@@ -139,6 +141,19 @@ class _Stretch(NamedTuple):
     part: Array  # (2F + 1, W) transform
     before: ReferenceEstimates
 
+    @property
+    def kind(self) -> tuple[int, bool]:
+        """What stretches have in common that are tested at once: equations, and whether lines are corrected."""
+        return id(self.before.equations), self.before.correction is not None
+
+    def corrected(self, model: InstrumentModel | None, spectrum: Spectrum) -> CorrectedLines:
+        """Clean lines, corrected as those are that the estimates are of."""
+        known = self.before
+        assert known.correction is not None
+        return known.correction.correct(
+            self.part, model, spectrum.omega, (self.start, self.end), known.equations, known.solution.theta
+        )
+
 
 def _summed(pieces: Sequence[tuple[float, Array]], span: int) -> Array:
     """(2F + 1, W) transform of the last ``span`` pieces."""
@@ -154,15 +169,21 @@ def _stretches(
         reference = next((r for r in reversed(change_monitor.references) if r.time <= start + 1e-6), None)
         if reference is None:
             return
-        yield _Stretch(start, end, _summed(pieces, span), reference)
+        known = reference.corrected if span >= LONG and reference.corrected is not None else reference
+        yield _Stretch(start, end, _summed(pieces, span), known)
 
 
 def _tested(stretches: Sequence[_Stretch], model: InstrumentModel | None, spectrum: Spectrum) -> Iterator[ScoreTest]:
     """How each contradicts the estimates from before it; those by the same equations at once."""
-    for _, some in groupby(stretches, key=lambda stretch: id(stretch.before.equations)):
-        starts, ends, parts, references = zip(*some, strict=True)
-        lines, duration = clean_lines(np.array(parts), model), np.array(ends) - np.array(starts)
-        yield from score_test(ReferenceEstimates.stacked(references), lines, spectrum, duration).each()
+    for (_, corrected), some in groupby(stretches, key=lambda stretch: stretch.kind):
+        stretched = list(some)
+        duration = np.array([stretch.end - stretch.start for stretch in stretched])
+        reference = ReferenceEstimates.stacked([stretch.before for stretch in stretched])
+        if corrected:
+            lines, errors = map(np.array, zip(*(one.corrected(model, spectrum) for one in stretched), strict=True))
+        else:
+            lines, errors = clean_lines(np.array([stretch.part for stretch in stretched]), model), None
+        yield from score_test(reference, lines, spectrum, duration, errors).each()
 
 
 def _due(look: int) -> list[int]:
@@ -228,11 +249,16 @@ def _contradicted(tests: ChangeTests, span: int, excited: ExcitedSegments, block
 def compare(
     full: NormalEquations, change_monitor: ChangeMonitor, excited_segments: list[ExcitedSegments], memory: float
 ) -> None:
-    """Mark the coefficients whose estimates contradict those from well-excited flight."""
+    """Mark the coefficients whose estimates contradict those from well-excited flight.
+
+    Estimates by least squares, where instruments are weak in that flight, are biased by gusts. They contradict none
+    that are made by instruments.
+    """
     published = change_monitor.references[-1]
     change_monitor.contradicted_by_excited = np.zeros(len(full.structure.coefficients), dtype=bool)
     for block, excited in enumerate(excited_segments):
         reference = estimates_of(excited, full, published.time - memory, published.time)
         if reference is not None:
-            firm = (full.structure.block == block) & (reference.uncertainty.freedom >= KNOWN)
+            alike = reference.equations.instrumented | ~published.equations.instrumented
+            firm = alike & (full.structure.block == block) & (reference.uncertainty.freedom >= KNOWN)
             change_monitor.contradicted_by_excited |= firm & (disagreement(reference, published) < DOUBT)

@@ -13,8 +13,10 @@ noise, which the estimates were freed of (``regressor_noise``). The score's mean
 the controls hardly move, it is the largest part of the score. It is taken off, as much of it as brings F down, but no
 more than the file's noise makes: how large the noise is at present is not known better. Over stretches shorter than the
 period of the line spacing Z'KZ is Z'Z over twice that spacing. S is taken by bands, and no less than what no
-derivatives explain of the stretch itself: air that has become rougher is no contradiction either. Where a servo's time
-is known to a standard error only, what such an error makes of the score is added to its covariance.
+derivatives explain of the stretch itself: air that has become rougher is no contradiction either. C counts with the
+factor that gusts bring to the variances, which the controls answer. Where a servo's time is known to a standard error
+only, what such an error makes of the score is added to its covariance. So are the errors of what the lines were
+corrected for (``corrected_lines``).
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ from scipy.special import fdtrc
 from sysid_node.online.regression.information import Spectrum
 from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
 from sysid_node.online.regression.normal_equations import NormalEquations
+from sysid_node.online.systematic.corrected_lines import LineCorrection
 
 Array = NDArray[np.float64]
 
@@ -51,10 +54,21 @@ class ReferenceEstimates:
     uncertainty: Uncertainty
     noise_score: Array | None = None  # (P, C) the score's mean by the sensors' noise, per line and second; None: zero
     time_errors: Array | None = None  # (P,) standard errors of the regressors' times, s; None: all are exact
+    inflation: Array | None = None  # (C,) factors of the covariance by gusts that the controls answer; None: one
+    correction: LineCorrection | None = None  # of the lines that the estimates are of; None: they are as recorded
+    corrected: ReferenceEstimates | None = None  # the same estimates by corrected lines; None: there are none
 
-    def moved(self, by: Array) -> ReferenceEstimates:
-        """The same with estimates that differ ``by`` (P, C)."""
-        return replace(self, solution=replace(self.solution, theta=self.solution.theta + by))
+    def moved_as(self, before: ReferenceEstimates, after: ReferenceEstimates) -> ReferenceEstimates:
+        """The same with estimates that differ as those ``before`` and ``after`` a servo's columns moved."""
+        by, corrected = after.solution.theta - before.solution.theta, None
+        if self.corrected is not None and before.corrected is not None and after.corrected is not None:
+            corrected = self.corrected.moved_as(before.corrected, after.corrected)
+        return replace(
+            self,
+            solution=replace(self.solution, theta=self.solution.theta + by),
+            correction=self.correction and self.correction.without_servos(),
+            corrected=corrected,
+        )
 
     @classmethod
     def stacked(cls, some: Sequence[ReferenceEstimates]) -> ReferenceEstimates:
@@ -64,7 +78,9 @@ class ReferenceEstimates:
         scores = [one.noise_score if one.noise_score is not None else np.zeros_like(one.solution.theta) for one in some]
         exact = np.zeros(some[0].equations.columns.size)
         times = [exact if one.time_errors is None else one.time_errors for one in some]
-        return cls(some[0].time, some[0].equations, solution, uncertainty, np.array(scores), np.array(times))
+        none = np.ones(solution.theta.shape[-1])
+        factors = np.array([none if one.inflation is None else one.inflation for one in some])
+        return cls(some[0].time, some[0].equations, solution, uncertainty, np.array(scores), np.array(times), factors)
 
 
 def _columns(rows: Sequence[Solution] | Sequence[Uncertainty]) -> Iterator[NDArray[Any]]:
@@ -93,8 +109,14 @@ class ScoreTest:
             yield ScoreTest(some[0], self.count, *some[1:])
 
 
-def score_test(reference: ReferenceEstimates, lines: Array, spectrum: Spectrum, duration: Any) -> ScoreTest:
-    """Test the clean ``lines`` (..., 2F, W) of stretches of ``duration`` (...) s."""
+def score_test(
+    reference: ReferenceEstimates, lines: Array, spectrum: Spectrum, duration: Any, errors: Array | None = None
+) -> ScoreTest:
+    """Test the clean ``lines`` (..., 2F, W) of stretches of ``duration`` (...) s.
+
+    ``errors`` (..., C, 2F, K) are those of the residuals by K independent errors of the lines, one standard deviation
+    of each.
+    """
     equations, known = reference.equations, reference.uncertainty
     structure = equations.structure
     density_per_gram = math.pi / float(spectrum.omega[1] - spectrum.omega[0])
@@ -111,9 +133,15 @@ def score_test(reference: ReferenceEstimates, lines: Array, spectrum: Spectrum, 
     noise = (Z.swapaxes(-1, -2) * known.bands.take(of_each, axis=-1)[..., None, :]) @ Z
     noise *= (density_per_gram * np.maximum(excess, 1.0))[..., None, None]
     G = (regressed.take(equations.instruments, axis=-2) * structure.same_block)[..., None, :, :]
-    spread = noise + G @ known.covariance @ G.swapaxes(-1, -2)
+    covariance = known.covariance
+    if reference.inflation is not None:
+        covariance = reference.inflation[..., None, None] * covariance
+    spread = noise + G @ covariance @ G.swapaxes(-1, -2)
     if reference.time_errors is not None and reference.time_errors.any():
         spread += _by_times(reference, Z, lines.take(equations.columns, axis=-1), spectrum.omega)
+    if errors is not None:
+        off = Z.swapaxes(-1, -2) @ errors  # (..., C, P, K)
+        spread += off @ off.swapaxes(-1, -2)
     score = (left_over.take(equations.instruments, axis=-2) * structure.belongs).swapaxes(-1, -2)
     motion = np.maximum(gram.diagonal(axis1=-2, axis2=-1).take(equations.outputs, axis=-1), TINY)
     by_noise = None

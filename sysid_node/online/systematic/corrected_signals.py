@@ -98,7 +98,7 @@ def corrected_signals(
     )
     yield
     moments = cross_spectra.band_moments(spectra, lines.omega, lines.bands)
-    matrix = _matrix(np.tensordot(estimate, changes.signals, axes=1), changes.rates)
+    matrix = corrected_by(changes, estimate)
     means = total.integrals / max(float(total.integrals[OFFSET]), 1e-12)
     of_regression = matrix[imperfect.places]
     grams = of_regression @ moments @ of_regression.T
@@ -113,11 +113,12 @@ def corrected_signals(
     )
 
 
-def _matrix(change: Array, rates: NDArray[np.intp]) -> Array:
-    """(N, 2N) that makes the corrected signals, to the second order in the ``change`` (N, 2N): exp(change).
+def corrected_by(changes: ColumnChanges, estimate: Array) -> Array:
+    """(N, 2N) that makes the signals without the ``estimate`` (K,) of signals and rates: exp of their change.
 
-    A scale and a lag, say, multiply. Only second derivatives are left out. ``rates`` (N,): where the signals' are.
+    It is of second order: a scale and a lag, say, multiply. Only second derivatives are left out.
     """
+    change, rates = np.tensordot(estimate, changes.signals, axes=1), changes.rates
     N = len(change)
     kept = rates < N
     own = change[:, :N].copy()

@@ -1,5 +1,6 @@
 """Abrupt changes: announced soon where there is one and never where there is none. Truth: simulated flights."""
 
+import math
 from dataclasses import replace
 from functools import cache
 
@@ -8,11 +9,12 @@ import pytest
 from numpy.typing import NDArray
 from plant import TRUTH, exact_flight, fly, made_aircraft, multisteps
 
-from sysid_node.online.changes.detection import ChangeMonitor
+from sysid_node.online.changes.detection import ChangeMonitor, compare
+from sysid_node.online.changes.excited_segments import estimates_of, no_excited_segments, remember
 from sysid_node.online.changes.score_test import ReferenceEstimates
 from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression import normal_equations
-from sysid_node.online.regression.information import BANDS
+from sysid_node.online.regression.information import BANDS, nothing
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.replay import run
@@ -203,3 +205,39 @@ def test_detection_can_be_left_out() -> None:
     time, flights = fly(AIRCRAFT, multisteps(20.0, RATE), RATE, 1, after=after)
     history = run(AIRCRAFT, OnlineSettings(detect_changes=False), time, flights[0], np.arange(1.0, 20.0, 0.25))
     assert announced(history) == []
+
+
+def compared(instrumented: bool, off: float) -> Array:
+    """Whether an estimate of well-excited flight by least squares contradicts one that is ``off`` by so much."""
+    layout = SignalLayout(("alpha", "de"), ("de",), ("alpha",) if instrumented else ())
+    plan = normal_equations.normal_equations({"Cm": ("0", "alpha", "de")}, layout)
+    rng, said = np.random.default_rng(4), nothing(layout)
+    lines = rng.normal(size=(BANDS, 20, layout.width))
+    x = lines[..., plan.columns]
+    lines[..., plan.outputs[0]] = x.sum(axis=-1) + 0.05 * rng.normal(size=x.shape[:-1])
+    if instrumented:  # an instrument that says nothing of its regressor: least squares takes its place
+        lines[..., plan.instruments[plan.instruments != plan.columns]] = rng.normal(size=(BANDS, 20, 1))
+    said.grams = lines.swapaxes(-1, -2) @ lines
+    said.scores, said.traces, said.trace_square = said.grams, np.full(BANDS, 20.0), 20.0 * BANDS
+    excited, monitor = no_excited_segments(plan, layout), ChangeMonitor()
+    remember(excited, said, 25.0)
+    by_least_squares = estimates_of(excited[0], plan, -math.inf, 25.0)
+    assert by_least_squares is not None
+    published = replace(by_least_squares, time=30.0, equations=plan)
+    by = np.full_like(published.solution.theta, off)
+    monitor.references.append(
+        replace(published, solution=replace(published.solution, theta=published.solution.theta + by))
+    )
+    compare(plan, monitor, excited, math.inf)
+    assert monitor.contradicted_by_excited is not None
+    return monitor.contradicted_by_excited
+
+
+def test_earlier_manoeuvres_contradict_what_is_far_from_them() -> None:
+    assert compared(False, 0.5).all()
+    assert not compared(False, 0.0).any()
+
+
+def test_least_squares_contradicts_nothing_that_was_solved_for_by_instruments() -> None:
+    """Gusts bias it, and not those."""
+    assert not compared(True, 0.5).any()

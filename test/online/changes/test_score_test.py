@@ -69,6 +69,29 @@ def test_uncertain_estimates_contradict_less() -> None:
     assert (less > hardly).all()
 
 
+def test_errors_of_the_lines_and_gusts_that_controls_answer_contradict_less() -> None:
+    """One error of each residual, alike in all lines: the score's covariance has its square, F as by hand."""
+    rng = np.random.default_rng(2)
+    lines, density = rng.normal(size=(LINES, PLAN.width)), 1e-3
+    P, C = PLAN.columns.size, PLAN.outputs.size
+    theta, covariance = np.zeros((P, C)), 1e-4 * np.tile(np.eye(P), (C, 1, 1))
+    known = reference(theta, covariance, density)
+    sure = score_test(known, lines, SPECTRUM, 500.0)
+    errors = rng.normal(size=(C, LINES, 1))
+    found = score_test(known, lines, SPECTRUM, 500.0, errors)
+    assert (found.statistic < sure.statistic).all()
+    for c in range(C):
+        Z = lines[:, PLAN.columns[PLAN.structure.unknowns(c)]]
+        score = Z.T @ lines[:, PLAN.outputs[c]]
+        excess = max(float(sure.unexplained[c]), 1.0)
+        spread = Z.T @ Z * density * excess * 0.5 / 0.04 + 1e-4 * (Z.T @ Z) @ (Z.T @ Z).T
+        spread += np.outer(Z.T @ errors[c, :, 0], Z.T @ errors[c, :, 0])
+        assert found.statistic[c] == pytest.approx(score @ np.linalg.solve(spread, score) / score.size, rel=1e-6)
+    inflated = score_test(replace(known, inflation=np.full(C, 4.0)), lines, SPECTRUM, 500.0)
+    wider = score_test(reference(theta, 4.0 * covariance, density), lines, SPECTRUM, 500.0)
+    np.testing.assert_allclose(inflated.statistic, wider.statistic, rtol=1e-9)
+
+
 def test_the_noise_of_regressors_that_do_not_move_is_no_contradiction() -> None:
     """Nothing moves, alpha is noise: Z'r has the mean -theta times the noise's energy, by the noise's own density."""
     rng, duration, noise, slope = np.random.default_rng(5), 25.0, 0.3, 4.0
