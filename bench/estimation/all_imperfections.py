@@ -1,6 +1,6 @@
 """Coverage of the intervals where everything is a little off at once.
 
-    python -m bench.estimation.all_imperfections RESULTS.jsonl [--flights 60] [--first 1] [--page FILE]
+    python -m bench.estimation.all_imperfections RESULTS.jsonl [--flights 60] [--first 1] [--replay] [--page FILE]
     python -m bench.estimation.all_imperfections RESULTS.jsonl --flights 0 --before OTHER.jsonl [--page ...]
 
 Each flight is that of `sysid simulate --aircraft cdrw --manoeuvre 3211:repeat=3`, with imperfections drawn as aircraft
@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -123,7 +123,7 @@ def estimated(method: str, aircraft: Aircraft, streams: Streams, carried: str) -
     return fit.estimates, fit.systematic.servos
 
 
-def flown(simulator: Simulator, aircraft: Aircraft, number: int) -> dict[str, Any]:
+def flown(simulator: Simulator, aircraft: Aircraft, number: int, methods: Sequence[str] = METHODS) -> dict[str, Any]:
     """One line of the results: of each method the rows of derivatives and servos, and how many were valid without."""
     kind, effects = drawn(aircraft, number)
     sortie = fly(simulator, effects, kind["air"], number)
@@ -134,7 +134,7 @@ def flown(simulator: Simulator, aircraft: Aircraft, number: int) -> dict[str, An
         name: effects["command_delay"][name] + effects["actuator_lag"][name] * (2.0 * damping if damping else 1.0)
         for name in aircraft.controls
     }
-    for method in METHODS:
+    for method in methods:
         derivatives, servos = estimated(method, file, streams, "auto")
         line[method] = {name: _row(d, truth[name]) for name, d in derivatives.items()}
         line[f"{method}_servos"] = {name: _row(d, late[name]) for name, d in servos.items()}
@@ -170,16 +170,16 @@ def counted(lines: list[dict[str, Any]], rows: str) -> list[str]:
     return [f"{len(valid) / len(lines):.1f}", *shares]
 
 
-def tables(lines: list[dict[str, Any]]) -> str:
-    """Both methods by group, then each derivative."""
+def tables(lines: list[dict[str, Any]], methods: Sequence[str] = METHODS) -> str:
+    """The methods by group, then each derivative."""
     counts = ("valid", "hold", "> 4 s.e.")
-    heads = ("flights", "number", "valid, exact", *(f"{m}: {c}" for m in (*METHODS, "servos") for c in counts))
+    heads = ("flights", "number", "valid, exact", *(f"{m}: {c}" for m in (*methods, "servos") for c in counts))
     body = [
         [
             name,
             str(len(some)),
             f"{np.mean([line['valid_exact'] for line in some]):.1f}",
-            *(cell for method in METHODS for cell in counted(some, method)),
+            *(cell for method in methods for cell in counted(some, method)),
             *counted(some, "replay_servos"),
         ]
         for name, some in groups(lines)
@@ -187,7 +187,7 @@ def tables(lines: list[dict[str, Any]]) -> str:
     each = []
     for name in lines[0]["replay"]:
         row = [f"`{name}`"]
-        for method in METHODS:
+        for method in methods:
             rows = [line[method][name] for line in lines if line[method][name][4]]
             scores = [(r[0] - r[5]) / r[1] for r in rows]
             held = sum(r[2] <= r[5] <= r[3] for r in rows)
@@ -195,7 +195,7 @@ def tables(lines: list[dict[str, Any]]) -> str:
             row += [f"{np.mean(scores):+.2f}" if rows else "-", f"{np.std(scores):.2f}" if rows else "-"]
         each.append(row)
     columns = ("valid in flights", "hold", "mean error / s.e.", "scatter / s.e.")
-    second = ("derivative", *(f"{m}: {c}" for m in METHODS for c in columns))
+    second = ("derivative", *(f"{m}: {c}" for m in methods for c in columns))
     return f"{table(heads, body)}\n\n{table(second, each)}"
 
 
@@ -235,20 +235,22 @@ def main() -> None:
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     parser.add_argument("--before", type=Path, help="results of another version, to be held against these")
     parser.add_argument("--seen", action="store_true", help="with --before: flights that the development has seen")
+    parser.add_argument("--replay", action="store_true", help="the online estimator alone")
     args = parser.parse_args()
-    lines = _read(args.results)
+    lines, methods = _read(args.results), METHODS[:1] if args.replay else METHODS
     aircraft = load_aircraft("cdrw")
     simulator = Simulator(aircraft, RATE)
     for number in range(args.first, args.first + args.flights):
         if all(line["number"] != number for line in lines):
-            lines.append(flown(simulator, aircraft, number))
+            lines.append(flown(simulator, aircraft, number, methods))
             with args.results.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(lines[-1]) + "\n")
     if args.before:
         section = f"bench/estimation/all_imperfections.py {'seen' if args.seen else 'before'}"
         publish(section, compared(_read(args.before), lines), args.page)
         return
-    publish("bench/estimation/all_imperfections.py", tables(lines), args.page)
+    section = f"bench/estimation/all_imperfections.py{' replay' if args.replay else ''}"
+    publish(section, tables(lines, methods), args.page)
 
 
 if __name__ == "__main__":

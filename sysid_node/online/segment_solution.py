@@ -177,6 +177,8 @@ def solve_all(
         tests=_model_tests(state, found.solution, spread, gram, systematic),
         systematic=systematic,
     )
+    off = None if systematic is None else systematic.covariance
+    before, corrected = (replace(one, systematic=off) for one in (before, corrected))
     before = replace(before, time_errors=_time_errors(state, systematic))
     state.changes.monitor.add_reference(_with_corrected(state, before, corrected, signals, systematic))
 

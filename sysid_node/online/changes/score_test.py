@@ -16,7 +16,7 @@ period of the line spacing Z'KZ is Z'Z over twice that spacing. S is taken by ba
 derivatives explain of the stretch itself: air that has become rougher is no contradiction either. C counts with the
 factor that gusts bring to the variances, which the controls answer. Where a servo's time is known to a standard error
 only, what such an error makes of the score is added to its covariance. So are the errors of what the lines were
-corrected for (``corrected_lines``).
+corrected for (``corrected_lines``), and a share of the estimates' systematic errors.
 """
 
 from __future__ import annotations
@@ -41,6 +41,9 @@ Array = NDArray[np.float64]
 
 LEAST = 0.1  # share of a stretch's energy that at least counts as the noise's, however many unknowns it has
 RIDGE = 1e-9  # share by which what did not move is set apart
+#: Share of the systematic errors by which manoeuvres may differ: imperfections are corrected to first order, and their
+#: products and second derivatives act otherwise in each.
+SECOND_ORDER = 0.2
 NUISANCES = 3  # lines that offset, constant and drift take up
 
 
@@ -55,6 +58,7 @@ class ReferenceEstimates:
     noise_score: Array | None = None  # (P, C) the score's mean by the sensors' noise, per line and second; None: zero
     time_errors: Array | None = None  # (P,) standard errors of the regressors' times, s; None: all are exact
     inflation: Array | None = None  # (C,) factors of the covariance by gusts that the controls answer; None: one
+    systematic: Array | None = None  # (C, P, P) systematic covariance of the estimates; None: all is exact
     correction: LineCorrection | None = None  # of the lines that the estimates are of; None: they are as recorded
     corrected: ReferenceEstimates | None = None  # the same estimates by corrected lines; None: there are none
 
@@ -78,9 +82,17 @@ class ReferenceEstimates:
         scores = [one.noise_score if one.noise_score is not None else np.zeros_like(one.solution.theta) for one in some]
         exact = np.zeros(some[0].equations.columns.size)
         times = [exact if one.time_errors is None else one.time_errors for one in some]
-        none = np.ones(solution.theta.shape[-1])
-        factors = np.array([none if one.inflation is None else one.inflation for one in some])
-        return cls(some[0].time, some[0].equations, solution, uncertainty, np.array(scores), np.array(times), factors)
+        none, zero = np.ones(solution.theta.shape[-1]), np.zeros_like(uncertainty.covariance[0])
+        return cls(
+            some[0].time,
+            some[0].equations,
+            solution,
+            uncertainty,
+            np.array(scores),
+            np.array(times),
+            np.array([none if one.inflation is None else one.inflation for one in some]),
+            np.array([zero if one.systematic is None else one.systematic for one in some]),
+        )
 
 
 def _columns(rows: Sequence[Solution] | Sequence[Uncertainty]) -> Iterator[NDArray[Any]]:
@@ -136,6 +148,8 @@ def score_test(
     covariance = known.covariance
     if reference.inflation is not None:
         covariance = reference.inflation[..., None, None] * covariance
+    if reference.systematic is not None:
+        covariance = covariance + SECOND_ORDER**2 * reference.systematic
     spread = noise + G @ covariance @ G.swapaxes(-1, -2)
     if reference.time_errors is not None and reference.time_errors.any():
         spread += _by_times(reference, Z, lines.take(equations.columns, axis=-1), spectrum.omega)

@@ -92,6 +92,22 @@ def test_errors_of_the_lines_and_gusts_that_controls_answer_contradict_less() ->
     np.testing.assert_allclose(inflated.statistic, wider.statistic, rtol=1e-9)
 
 
+def test_a_share_of_the_systematic_errors_contradicts_nothing() -> None:
+    """As if the estimates' covariance were larger by a fifth of these errors, squared; as they are alone, F is larger."""
+    rng = np.random.default_rng(6)
+    lines, density = rng.normal(size=(LINES, PLAN.width)), 1e-3
+    P, C = PLAN.columns.size, PLAN.outputs.size
+    theta, covariance = np.zeros((P, C)), 1e-4 * np.tile(np.eye(P), (C, 1, 1))
+    known = reference(theta, covariance, density)
+    off = replace(known, systematic=25.0 * covariance)
+    found = score_test(off, lines, SPECTRUM, 500.0).statistic
+    wider = score_test(reference(theta, 2.0 * covariance, density), lines, SPECTRUM, 500.0).statistic
+    np.testing.assert_allclose(found, wider, rtol=1e-9)
+    several = score_test(ReferenceEstimates.stacked([known, off]), np.array([lines, lines]), SPECTRUM, [500.0, 500.0])
+    np.testing.assert_allclose(several.statistic[1], found, rtol=1e-9)
+    assert (several.statistic[0] > found).all()
+
+
 def test_the_noise_of_regressors_that_do_not_move_is_no_contradiction() -> None:
     """Nothing moves, alpha is noise: Z'r has the mean -theta times the noise's energy, by the noise's own density."""
     rng, duration, noise, slope = np.random.default_rng(5), 25.0, 0.3, 4.0
