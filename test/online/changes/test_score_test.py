@@ -93,7 +93,7 @@ def test_errors_of_the_lines_and_gusts_that_controls_answer_contradict_less() ->
 
 
 def test_a_share_of_the_systematic_errors_contradicts_nothing() -> None:
-    """As if the estimates' covariance were larger by a fifth of these errors, squared; as they are alone, F is larger."""
+    """As if a fifth of these errors were in the estimates' standard errors; without them F is larger."""
     rng = np.random.default_rng(6)
     lines, density = rng.normal(size=(LINES, PLAN.width)), 1e-3
     P, C = PLAN.columns.size, PLAN.outputs.size
