@@ -11,11 +11,13 @@ import pytest
 from plant import fly, made_aircraft, multisteps
 
 from sysid_node.aircraft.model import UncertainValue
-from sysid_node.online import estimator, segment_solution
+from sysid_node.online import estimator
 from sysid_node.online.changes.score_test import ReferenceEstimates
+from sysid_node.online.segment_information import measure_segment
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.state import EstimatorState, completed, current_lines
 from sysid_node.online.systematic.corrected_lines import CorrectedLines, LineCorrection
+from sysid_node.online.systematic.corrected_signals import corrected_signals
 
 RATE, SECONDS = 100.0, 14.0
 EXACT = made_aircraft()
@@ -56,11 +58,20 @@ def test_lines_have_the_gram_matrix_that_follows_from_cross_spectra():
     state = flown()
     correction, reference = known(state)
     assert np.abs(correction.estimate).max() > 0.0
-    total = segment_solution.measure_segment(state, current_lines(state))
-    signals = completed(segment_solution._corrected_signals(state, total, correction.estimate))
-    assert signals is not None
+    model, total = state.model, measure_segment(state, current_lines(state))
+    signals = completed(
+        corrected_signals(
+            correction.imperfect,
+            model.spectrum,
+            model.instrument_model,
+            correction.servos,
+            total,
+            correction.estimate,
+            (total.energy, correction.changes),
+        )
+    )
     expected = signals.information.grams.sum(axis=0)
-    lines = corrected(state, replace(correction, changes=signals.changes), reference.solution.theta).lines
+    lines = corrected(state, correction, reference.solution.theta).lines
     found = lines.T @ lines
     scale = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
     used = np.unique([*reference.equations.columns, *reference.equations.outputs])
