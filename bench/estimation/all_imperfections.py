@@ -1,14 +1,13 @@
 """Coverage of the intervals where everything is a little off at once.
 
     python -m bench.estimation.all_imperfections RESULTS.jsonl [--flights 60] [--first 1] [--replay] [--page FILE]
-    python -m bench.estimation.all_imperfections RESULTS.jsonl --flights 0 --before OTHER.jsonl [--page ...]
 
 Each flight is that of `sysid simulate --aircraft cdrw --manoeuvre 3211:repeat=3`, with imperfections drawn as aircraft
 have them: servos of first order (20 to 120 ms) or second (3 to 12 Hz), rate limits of 2 to 6 rad/s, delays up to 40 ms,
 late gyroscopes and air data, and every tolerance of the aircraft file at its size. The estimators have the commands
 alone. Of the servos the aircraft file is right, wrong by its tolerances, or silent. A flight's number is the seed of
-all that is drawn, so that results can be continued; they are appended line by line. `--page` makes the tables.
-`--before` holds the replays of two versions of the package against each other, in the flights that both files have.
+all that is drawn, so that results can be continued; they are appended line by line. `--page` makes the tables, and
+`--replay` those of the online estimator alone.
 """
 
 from __future__ import annotations
@@ -199,29 +198,6 @@ def tables(lines: list[dict[str, Any]], methods: Sequence[str] = METHODS) -> str
     return f"{table(heads, body)}\n\n{table(second, each)}"
 
 
-def compared(before: list[dict[str, Any]], after: list[dict[str, Any]]) -> str:
-    """The replays of two versions in the same flights, by group; then the mean errors of each derivative."""
-    common = {line["number"] for line in before} & {line["number"] for line in after}
-    both = [[line for line in lines if line["number"] in common] for lines in (before, after)]
-    counts = ("valid", "hold", "> 4 s.e.")
-    named = [f"{what}{count}: {when}" for what in ("", "servos ") for count in counts for when in ("before", "after")]
-    body = []
-    for (name, old), (_, new) in zip(*map(groups, both), strict=True):
-        cells = [[*counted(some, "replay"), *counted(some, "replay_servos")] for some in (old, new)]
-        exact = f"{np.mean([line['valid_exact'] for line in new]):.1f}"
-        body.append([name, str(len(new)), exact, *(cell for pair in zip(*cells, strict=True) for cell in pair)])
-    each = []
-    for name in both[0][0]["replay"]:
-        row = [f"`{name}`"]
-        for lines in both:
-            rows = [line["replay"][name] for line in lines if line["replay"][name][4]]
-            scores = [(r[0] - r[5]) / r[1] for r in rows]
-            row += [str(len(rows)), f"{np.mean(scores):+.2f}" if rows else "-"]
-        each.append(row)
-    second = ("derivative", *(f"{what}, {when}" for when in ("before", "after") for what in ("valid", "mean error")))
-    return f"{table(('flights', 'number', 'valid, exact', *named), body)}\n\n{table(second, each)}"
-
-
 def _read(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
 
@@ -233,8 +209,6 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=60, help="how many flights (default: 60)")
     parser.add_argument("--first", type=int, default=1, help="number of the first flight (default: 1)")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
-    parser.add_argument("--before", type=Path, help="results of another version, to be held against these")
-    parser.add_argument("--seen", action="store_true", help="with --before: flights that the development has seen")
     parser.add_argument("--replay", action="store_true", help="the online estimator alone")
     args = parser.parse_args()
     lines, methods = _read(args.results), METHODS[:1] if args.replay else METHODS
@@ -245,10 +219,6 @@ def main() -> None:
             lines.append(flown(simulator, aircraft, number, methods))
             with args.results.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(lines[-1]) + "\n")
-    if args.before:
-        section = f"bench/estimation/all_imperfections.py {'seen' if args.seen else 'before'}"
-        publish(section, compared(_read(args.before), lines), args.page)
-        return
     section = f"bench/estimation/all_imperfections.py{' replay' if args.replay else ''}"
     publish(section, tables(lines, methods), args.page)
 

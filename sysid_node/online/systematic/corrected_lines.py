@@ -65,9 +65,8 @@ class LineCorrection:
         have in the lines is taken out: rates are j omega times the lines but for them.
         """
         own = self._all_lines(transform, model, omega, ends)
-        both: Complex = np.concatenate(
-            [own, 1j * omega[:, None] * own], axis=1
-        )  # (F, 2N) of signals and of their rates
+        rates: Complex = 1j * omega[:, None] * own
+        both: Complex = np.concatenate([own, rates], axis=1)  # (F, 2N)
         matrix, place = corrected_by(self.changes, self.estimate), self.imperfect.places
         found = _stacked(both @ matrix[place].T)
         v = np.zeros((self.changes.columns.width, theta.shape[1]))

@@ -69,13 +69,21 @@ def test_uncertain_estimates_contradict_less() -> None:
     assert (less > hardly).all()
 
 
+DENSITY, VARIANCE = 1e-3, 1e-4  # of the usual noise, and of each estimate
+
+
+def nearly_known(rng: np.random.Generator) -> tuple[Array, ReferenceEstimates]:
+    """Lines of noise, and estimates of zero with small errors."""
+    P, C = PLAN.columns.size, PLAN.outputs.size
+    covariance = VARIANCE * np.tile(np.eye(P), (C, 1, 1))
+    return rng.normal(size=(LINES, PLAN.width)), reference(np.zeros((P, C)), covariance, DENSITY)
+
+
 def test_errors_of_the_lines_and_gusts_that_controls_answer_contradict_less() -> None:
     """One error of each residual, alike in all lines: the score's covariance has its square, F as by hand."""
     rng = np.random.default_rng(2)
-    lines, density = rng.normal(size=(LINES, PLAN.width)), 1e-3
-    P, C = PLAN.columns.size, PLAN.outputs.size
-    theta, covariance = np.zeros((P, C)), 1e-4 * np.tile(np.eye(P), (C, 1, 1))
-    known = reference(theta, covariance, density)
+    lines, known = nearly_known(rng)
+    C, theta, covariance = PLAN.outputs.size, known.solution.theta, known.uncertainty.covariance
     sure = score_test(known, lines, SPECTRUM, 500.0)
     errors = rng.normal(size=(C, LINES, 1))
     found = score_test(known, lines, SPECTRUM, 500.0, errors)
@@ -84,24 +92,21 @@ def test_errors_of_the_lines_and_gusts_that_controls_answer_contradict_less() ->
         Z = lines[:, PLAN.columns[PLAN.structure.unknowns(c)]]
         score = Z.T @ lines[:, PLAN.outputs[c]]
         excess = max(float(sure.unexplained[c]), 1.0)
-        spread = Z.T @ Z * density * excess * 0.5 / 0.04 + 1e-4 * (Z.T @ Z) @ (Z.T @ Z).T
+        spread = Z.T @ Z * DENSITY * excess * 0.5 / 0.04 + VARIANCE * (Z.T @ Z) @ (Z.T @ Z).T
         spread += np.outer(Z.T @ errors[c, :, 0], Z.T @ errors[c, :, 0])
         assert found.statistic[c] == pytest.approx(score @ np.linalg.solve(spread, score) / score.size, rel=1e-6)
     inflated = score_test(replace(known, inflation=np.full(C, 4.0)), lines, SPECTRUM, 500.0)
-    wider = score_test(reference(theta, 4.0 * covariance, density), lines, SPECTRUM, 500.0)
+    wider = score_test(reference(theta, 4.0 * covariance, DENSITY), lines, SPECTRUM, 500.0)
     np.testing.assert_allclose(inflated.statistic, wider.statistic, rtol=1e-9)
 
 
 def test_a_share_of_the_systematic_errors_contradicts_nothing() -> None:
     """As if a fifth of these errors were in the estimates' standard errors; without them F is larger."""
-    rng = np.random.default_rng(6)
-    lines, density = rng.normal(size=(LINES, PLAN.width)), 1e-3
-    P, C = PLAN.columns.size, PLAN.outputs.size
-    theta, covariance = np.zeros((P, C)), 1e-4 * np.tile(np.eye(P), (C, 1, 1))
-    known = reference(theta, covariance, density)
+    lines, known = nearly_known(np.random.default_rng(6))
+    theta, covariance = known.solution.theta, known.uncertainty.covariance
     off = replace(known, systematic=25.0 * covariance)
     found = score_test(off, lines, SPECTRUM, 500.0).statistic
-    wider = score_test(reference(theta, 2.0 * covariance, density), lines, SPECTRUM, 500.0).statistic
+    wider = score_test(reference(theta, 2.0 * covariance, DENSITY), lines, SPECTRUM, 500.0).statistic
     np.testing.assert_allclose(found, wider, rtol=1e-9)
     several = score_test(ReferenceEstimates.stacked([known, off]), np.array([lines, lines]), SPECTRUM, [500.0, 500.0])
     np.testing.assert_allclose(several.statistic[1], found, rtol=1e-9)
