@@ -1,4 +1,4 @@
-"""Lookup tables: linear between their points, held beyond the ends. The same for NumPy and JAX, scalars and series.
+"""Lookup tables: linear between their points, held beyond the ends. The same for NumPy and JAX, numbers and series.
 
 All tables of an aircraft are looked up at once. An aircraft that was read from another simulator has a hundred of them,
 and a compiled program that looked up one after the other would take minutes to compile.
@@ -6,94 +6,109 @@ and a compiled program that looked up one after the other would take minutes to 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
+from sysid_node.dynamics.packed_tables import PackedTables, Places, coefficients_of, variables_of
 from sysid_node.dynamics.vector import Namespace, Real
 
 
-class PackedTables(NamedTuple):
-    """T tables of one or two variables as arrays of one size: each is padded, and a single variable has a second one.
-
-    Points beyond a table's last have its last value, so that they are never told from holding it.
-    """
-
-    rows: Real  # (T, n) points of the first variable
-    columns: Real  # (T, m) points of the second
-    values: Real  # (T, n, m)
-
-
-def pack(tables: Sequence[tuple[Sequence[ArrayLike], ArrayLike]]) -> PackedTables:
-    """The tables, each given by the increasing points of its one or two variables and its values, in one."""
-    full = [_two_dimensional(points, values) for points, values in tables]
-    n, m = (max(len(item[axis]) for item in full) for axis in (0, 1))
-    rows, columns = ([_lengthened(item[axis], size) for item in full] for axis, size in ((0, n), (1, m)))
-    values = [np.pad(v, ((0, n - v.shape[0]), (0, m - v.shape[1])), "edge") for _, _, v in full]
-    return PackedTables(np.array(rows), np.array(columns), np.array(values))
-
-
 class Interpolation(NamedTuple):
-    """Values (..., T) of T tables, and their slopes (..., T) with the first and with the second variable.
+    """What the tables add to each of C coefficients, and how that changes with each of V variables.
 
     The slopes are those of the interval in which a variable lies, and zero beyond the ends.
     """
 
-    values: Real
-    by_first: Real
-    by_second: Real
+    values: Real  # (..., C)
+    slopes: Real  # (..., C, V)
 
 
-def interpolate(tables: PackedTables, first: Real, second: Real, xp: Namespace) -> Real:
-    """The tables' values (..., T) at their first and second variables (..., T); bilinear between the points."""
-    return interpolate_with_slopes(tables, first, second, xp).values
+def interpolate(places: Places, tables: PackedTables, at: Real, xp: Namespace) -> Real:
+    """The sums (..., C) of each coefficient's tables at the variables ``at`` (..., V); bilinear between the points.
+
+    ``places`` belong to ``tables``; C and V are in the order of ``coefficients_of`` and ``variables_of``.
+    """
+    incidence = _incidence(places)
+    found = _interpolate(incidence, tables, _intervals(tables.points, at, xp), xp)
+    return found.values @ incidence.coefficients
 
 
-def interpolate_with_slopes(tables: PackedTables, first: Real, second: Real, xp: Namespace) -> Interpolation:
+def interpolate_with_slopes(places: Places, tables: PackedTables, at: Real, xp: Namespace) -> Interpolation:
     """The same with the slopes."""
-    rows, columns = _interval(tables.rows, first, xp), _interval(tables.columns, second, xp)
-    count, n, m = tables.values.shape
-    flat, corner = tables.values.reshape(-1), (np.arange(count) * n + rows.index) * m + columns.index
-    (near_low, near_high), (far_low, far_high) = ((flat[k], flat[k + 1]) for k in (corner, corner + m))
-    a, b = rows.share, columns.share
-    low, high = (1.0 - b) * near_low + b * near_high, (1.0 - b) * far_low + b * far_high
-    across = (1.0 - a) * (near_high - near_low) + a * (far_high - far_low)
-    return Interpolation((1.0 - a) * low + a * high, (high - low) * rows.slope, across * columns.slope)
+    incidence, intervals = _incidence(places), _intervals(tables.points, at, xp)
+    found = _interpolate(incidence, tables, intervals, xp)
+    own = incidence.coefficients
+    by_share = found.by_first @ _by_both(own, incidence.first) + found.by_second @ _by_both(own, incidence.second)
+    slopes = by_share.reshape(*at.shape[:-1], -1, at.shape[-1]) * intervals.slope[..., None, :]
+    return Interpolation(found.values @ own, slopes)
 
 
-class _Interval(NamedTuple):
-    """Where a variable lies in each table's points."""
+class _Intervals(NamedTuple):
+    """Where each variable lies between its points."""
 
-    index: Real  # (..., T) of the point before it
-    share: Real  # (..., T) of the interval that lies before it, 0 to 1
-    slope: Real  # (..., T) of the share
+    index: Real  # (..., V) of the point before it
+    share: Real  # (..., V) of the interval that lies before it, 0 to 1
+    slope: Real  # (..., V) of the share
 
 
-def _interval(points: Real, x: Real, xp: Namespace) -> _Interval:
-    """Where x (..., T) lies in points (T, n).
+def _intervals(points: Real, x: Real, xp: Namespace) -> _Intervals:
+    """Where x (..., V) lies in points (V, n).
 
     By bisection: a compiled program would compare x with all points anew wherever the interval is used.
     """
-    table, last = np.arange(points.shape[0]), points.shape[1] - 2
-    index, step = xp.zeros(x.shape, dtype=int), 1 << last.bit_length()
+    count, n = points.shape
+    row, end, last = n * np.arange(count, dtype=np.int32), points[:, -1], n - 2
+
+    def point(index: Real) -> Real:
+        return xp.take(points.reshape(-1), row + index, mode="clip")
+
+    index, step = xp.zeros(x.shape, dtype=np.int32), 1 << last.bit_length()
     while step := step // 2:
         ahead = xp.minimum(index + step, last)
-        index = xp.where(points[table, ahead] <= x, ahead, index)
-    low, high = points[table, index], points[table, index + 1]
+        reached = point(ahead)
+        index = xp.where((reached <= x) & (reached < end), ahead, index)
+    low, high = point(index), point(index + 1)
     share = (x - low) / (high - low)
-    return _Interval(index, xp.clip(share, 0.0, 1.0), ((x >= low) & (x <= high)) / (high - low))
+    return _Intervals(index, xp.clip(share, 0.0, 1.0), ((x >= low) & (x <= high)) / (high - low))
 
 
-def _two_dimensional(points: Sequence[ArrayLike], values: ArrayLike) -> tuple[Any, Any, Any]:
-    value = np.asarray(values, dtype=float)
-    axes = [np.asarray(axis, dtype=float) for axis in points]
-    if len(axes) == 1:
-        return axes[0], np.array([0.0, 1.0]), np.column_stack([value, value])
-    return axes[0], axes[1], value
+class _OfTables(NamedTuple):
+    """Of each of T tables (..., T)."""
+
+    values: Real
+    by_first: Real  # slope with the share of the first variable's interval
+    by_second: Real  # with that of the second
 
 
-def _lengthened(points: Any, size: int) -> Any:
-    """The points with more at their end, further and further on."""
-    return np.append(points, points[-1] + np.arange(1, size - len(points) + 1))
+def _interpolate(incidence: _Incidence, tables: PackedTables, intervals: _Intervals, xp: Namespace) -> _OfTables:
+    cell, size = tables.starts + intervals.index @ tables.strides, tables.cells.shape[1]
+    c0, c1, c2, c3 = (xp.take(tables.cells.reshape(-1), cell + k * size, mode="clip") for k in range(4))
+    a, b = intervals.share @ incidence.first, intervals.share @ incidence.second
+    by_first, by_second = c1 + b * c3, c2 + a * c3
+    return _OfTables(c0 + a * c1 + b * by_second, by_first, by_second)
+
+
+class _Incidence(NamedTuple):
+    """Ones where a table is of a coefficient or over a variable, else zeros.
+
+    To pick columns by such a matrix is a third of the work of picking them by their numbers, in a compiled program.
+    """
+
+    coefficients: NDArray[Any]  # (T, C)
+    first: NDArray[Any]  # (V, T) each table's first variable
+    second: NDArray[Any]  # (V, T) its second
+
+
+def _incidence(places: Places) -> _Incidence:
+    variables, coefficients = variables_of(places), coefficients_of(places)
+    own = [[float(coefficient == name) for name in coefficients] for coefficient, _ in places]
+    first, second = ([[float(over[k : k + 1] == (v,)) for _, over in places] for v in variables] for k in (0, 1))
+    return _Incidence(np.array(own), np.array(first), np.array(second))
+
+
+def _by_both(coefficients: NDArray[Any], variables: NDArray[Any]) -> NDArray[Any]:
+    """(T, C V) ones where a table is of a coefficient and over a variable."""
+    pairs: NDArray[Any] = coefficients[:, :, None] * variables.T[:, None, :]
+    return pairs.reshape(len(coefficients), -1)

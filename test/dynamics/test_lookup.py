@@ -1,68 +1,109 @@
-"""Lookup tables against NumPy's and SciPy's interpolation."""
+"""Lookup tables against NumPy's and SciPy's interpolation, table by table."""
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
-from sysid_node.dynamics.lookup import PackedTables, interpolate, interpolate_with_slopes, pack
+from sysid_node.aircraft.model import LookupTable
+from sysid_node.dynamics.lookup import interpolate, interpolate_with_slopes
+from sysid_node.dynamics.packed_tables import PackedTables, coefficients_of, pack, variables_of
+from sysid_node.sim.compiled import xla
 
-X = np.array([-0.2, 0.0, 0.05, 0.35])
-Y = np.array([-0.3, 0.1, 0.4])
+xla.configure()  # float64
+
 RANDOM = np.random.default_rng(4)
-AT = RANDOM.uniform(-0.6, 0.6, (200, 2))
-LINE, GRID, LONG = RANDOM.standard_normal(X.size), RANDOM.standard_normal((X.size, Y.size)), RANDOM.standard_normal(9)
-LONG_X = np.linspace(-0.5, 0.5, 9)
-
-#: Of one variable and of two, of different lengths.
-TABLES = pack([((X,), LINE), ((X, Y), GRID), ((LONG_X,), LONG)])
+ALPHA, SPEED, RUDDER = (-0.2, 0.0, 0.05, 0.35), (10.0, 14.0, 25.0), (-0.3, 0.1, 0.4)
+LONG = tuple(np.linspace(-0.5, 0.5, 9))
 
 
-def looked_up(xp=np, tables=TABLES, at=AT):
-    return interpolate(tables, xp.stack([at[:, 0]] * 3, -1), xp.stack([at[:, 0], at[:, 1], at[:, 0]], -1), xp)
+def table(coefficient, **points):
+    """With random values."""
+    values = RANDOM.standard_normal([len(each) for each in points.values()])
+    return LookupTable(coefficient, tuple(points), tuple(points.values()), tuple(map(tuple, np.atleast_2d(values))))
 
 
-def test_one_variable_is_numpys_interpolation_held_beyond_the_ends():
-    found = looked_up()
-    np.testing.assert_allclose(found[:, 0], np.interp(AT[:, 0], X, LINE), atol=1e-14)
-    np.testing.assert_allclose(found[:, 2], np.interp(AT[:, 0], LONG_X, LONG), atol=1e-14)
+def line(coefficient, name, points):
+    return LookupTable(coefficient, (name,), (points,), tuple(RANDOM.standard_normal(len(points))))
 
 
-def test_two_variables_are_scipys_bilinear_interpolation():
-    held = np.column_stack([np.clip(AT[:, 0], X[0], X[-1]), np.clip(AT[:, 1], Y[0], Y[-1])])
-    np.testing.assert_allclose(looked_up()[:, 1], RegularGridInterpolator((X, Y), GRID)(held), atol=1e-14)
+#: Of one variable and of two, of different lengths and ends; some of one coefficient.
+TABLES = (
+    line("CL", "alpha", ALPHA),
+    table("Cn", alpha=ALPHA, dr=RUDDER),
+    table("Cn", dr=(-0.1, 0.2), alpha=(-0.1, 0.3)),
+    line("Cn", "dr", LONG),
+    line("Cm", "V", SPEED),
+    line("CL", "alpha", LONG),
+)
+PLACES, PACKED = pack(TABLES)
+VARIABLES, COEFFICIENTS = variables_of(PLACES), coefficients_of(PLACES)
+#: Some beyond the ends.
+SERIES = {
+    "alpha": RANDOM.uniform(-0.6, 0.6, 300),
+    "dr": RANDOM.uniform(-0.6, 0.6, 300),
+    "V": RANDOM.uniform(5.0, 30.0, 300),
+}
+AT = np.stack([SERIES[name] for name in VARIABLES], -1)
 
 
-def test_jax_gives_the_same_for_series_and_for_scalars():
-    tables = PackedTables(*(jnp.asarray(part) for part in TABLES))
-    np.testing.assert_allclose(looked_up(jnp, tables, jnp.asarray(AT)), looked_up(), atol=1e-12)
-    one = interpolate(tables, jnp.asarray(AT[5, [0, 0, 0]]), jnp.asarray(AT[5, [0, 1, 0]]), jnp)
-    np.testing.assert_allclose(one, looked_up()[5], atol=1e-12)
+def by_libraries(coefficient, at=AT):
+    """The sum of the coefficient's tables, by ``numpy.interp`` and SciPy."""
+    total, series = np.zeros(len(at)), dict(zip(VARIABLES, at.T, strict=True))
+    for each in TABLES:
+        if each.coefficient == coefficient:
+            held = [np.clip(series[v], own[0], own[-1]) for v, own in zip(each.over, each.points, strict=True)]
+            total += (
+                np.interp(held[0], each.points[0], each.values)
+                if len(held) == 1
+                else RegularGridInterpolator(each.points, np.array(each.values))(np.stack(held, -1))
+            )
+    return total
 
 
-def test_the_slope_is_that_of_the_interval():
-    tables = PackedTables(*(jnp.asarray(part) for part in TABLES))
-    slope = jax.grad(lambda x: interpolate(tables, jnp.full(3, x), jnp.zeros(3), jnp)[0])(0.2)
-    np.testing.assert_allclose(slope, (LINE[3] - LINE[2]) / (X[3] - X[2]))
+def jax_tables():
+    return PackedTables(*(jnp.asarray(part) for part in PACKED))
 
 
-def test_the_slopes_are_the_differences_within_an_interval_and_zero_beyond_the_ends():
-    first, second = np.stack([AT[:, 0]] * 3, -1), np.stack([AT[:, 0], AT[:, 1], AT[:, 0]], -1)
-    found, h = interpolate_with_slopes(TABLES, first, second, np), 1e-7
-    by_first, by_second = (
-        (interpolate(TABLES, first + a, second + b, np) - interpolate(TABLES, first - a, second - b, np)) / (2.0 * h)
-        for a, b in ((h, 0.0), (0.0, h))
-    )
-    np.testing.assert_allclose(found.by_first, by_first, atol=1e-6)
-    np.testing.assert_allclose(found.by_second, by_second, atol=1e-6)
-    beyond = (first[:, 0] < X[0]) | (first[:, 0] > X[-1])
+def test_each_coefficients_tables_are_added_up_as_the_libraries_interpolate_them():
+    found = interpolate(PLACES, PACKED, AT, np)
+    assert found.shape == (300, 3)
+    for k, coefficient in enumerate(COEFFICIENTS):
+        np.testing.assert_allclose(found[:, k], by_libraries(coefficient), atol=1e-13)
+
+
+def test_jax_gives_the_same_for_series_and_for_numbers():
+    expected = interpolate(PLACES, PACKED, AT, np)
+    np.testing.assert_allclose(interpolate(PLACES, jax_tables(), jnp.asarray(AT), jnp), expected, atol=1e-13)
+    one = interpolate(PLACES, jax_tables(), jnp.asarray(AT[5]), jnp)
+    np.testing.assert_allclose(one, expected[5], atol=1e-13)
+
+
+def test_jax_differentiates_through_the_tables():
+    def found(at):
+        return interpolate(PLACES, jax_tables(), at, jnp)
+
+    slopes = jax.vmap(jax.jacfwd(found))(jnp.asarray(AT))
+    np.testing.assert_allclose(slopes, interpolate_with_slopes(PLACES, PACKED, AT, np).slopes, atol=1e-11)
+
+
+def test_the_slopes_are_the_libraries_differences_and_zero_beyond_the_ends():
+    found, h = interpolate_with_slopes(PLACES, PACKED, AT, np), 1e-7
+    np.testing.assert_array_equal(found.values, interpolate(PLACES, PACKED, AT, np))
+    for v in range(len(VARIABLES)):
+        step = h * (np.arange(len(VARIABLES)) == v)
+        for c, coefficient in enumerate(COEFFICIENTS):
+            differences = (by_libraries(coefficient, AT + step) - by_libraries(coefficient, AT - step)) / (2.0 * h)
+            np.testing.assert_allclose(found.slopes[:, c, v], differences, atol=1e-6)
+    beyond = np.abs(SERIES["alpha"]) > 0.5
     assert beyond.any()
-    assert (found.by_first[beyond, :2] == 0.0).all()
+    assert (found.slopes[beyond, COEFFICIENTS.index("CL"), VARIABLES.index("alpha")] == 0.0).all()
 
 
-def test_a_point_of_a_table_belongs_to_the_interval_behind_it():
-    tables = pack([((LONG_X,), LONG), (([0.0, 2.0],), [1.0, 5.0])])
-    for place, slope in zip(LONG_X[:-1], np.diff(LONG) / np.diff(LONG_X), strict=True):
-        found = interpolate_with_slopes(tables, np.array([place, 0.5]), np.zeros(2), np)
-        np.testing.assert_allclose(found.by_first, [slope, 2.0])
-        np.testing.assert_allclose(found.values, [LONG[np.searchsorted(LONG_X, place)], 2.0])
+def test_a_point_of_a_table_belongs_to_the_interval_behind_it_and_the_last_to_the_one_before():
+    curve = line("CL", "alpha", LONG)
+    places, tables = pack([curve])
+    expected = np.diff(curve.values) / np.diff(LONG)
+    found = interpolate_with_slopes(places, tables, np.array(LONG)[:, None], np)
+    np.testing.assert_allclose(found.slopes[:, 0, 0], [*expected, expected[-1]])
+    np.testing.assert_allclose(found.values[:, 0], curve.values)

@@ -10,7 +10,8 @@ import jax.numpy as jnp
 from sysid_node.aircraft.model import Aircraft, LookupTable
 from sysid_node.aircraft.names import split_derivative
 from sysid_node.batch.models.model import ModelParameter, Scalars
-from sysid_node.dynamics.lookup import PackedTables, interpolate, pack
+from sysid_node.dynamics.lookup import interpolate
+from sysid_node.dynamics.packed_tables import PackedTables, coefficients_of, pack, variables_of
 from sysid_node.dynamics.tables import full_thrust, mach_number
 
 Signals = Mapping[str, jax.Array]
@@ -18,6 +19,8 @@ Signals = Mapping[str, jax.Array]
 Coefficients = Callable[[Signals, Scalars], dict[str, jax.Array]]
 #: ``name, signals -> value``.
 Regressor = Callable[[str, Signals], jax.Array]
+#: ``signals -> coefficient -> what tables add to it``.
+TableSum = Callable[[Signals], dict[str, jax.Array]]
 
 
 def derivative_parameters(
@@ -52,9 +55,8 @@ def coefficient_function(aircraft: Aircraft, names: Sequence[str], reference_rat
             if name != "k":
                 total[coefficient] = total.get(coefficient, 0.0) + value * regressor(name, signals)
         if added_by_tables is not None:
-            added = added_by_tables(signals)
-            for i, table in enumerate(tables):
-                total[table.coefficient] = total.get(table.coefficient, 0.0) + added[..., i]
+            for coefficient, added in added_by_tables(signals).items():
+                total[coefficient] = total.get(coefficient, 0.0) + added
         for (coefficient, name), value in zip(terms, theta, strict=True):
             if name == "k":
                 total[coefficient] = total.get(coefficient, 0.0) + value * total["CL"] ** 2
@@ -80,9 +82,9 @@ def _regressor_function(aircraft: Aircraft, reference_rates: bool) -> Regressor:
     return regressor
 
 
-def _table_function(tables: Sequence[LookupTable], regressor: Regressor, full: float) -> Callable[[Signals], jax.Array]:
-    """What T ``tables`` add (..., T); ``full`` (N): the thrust at full throttle."""
-    packed = pack([(table.points, table.values) for table in tables])
+def _table_function(tables: Sequence[LookupTable], regressor: Regressor, full: float) -> TableSum:
+    """What tables add to each coefficient that has any; ``full`` (N): the thrust at full throttle."""
+    places, packed = pack(tables)
 
     def variable(name: str, signals: Signals) -> jax.Array:
         if name == "Mach":
@@ -91,14 +93,9 @@ def _table_function(tables: Sequence[LookupTable], regressor: Regressor, full: f
             return signals.get("thrust", jnp.zeros_like(signals["V"])) / full
         return signals["V"] if name == "V" else regressor(name, signals)
 
-    def added(signals: Signals) -> jax.Array:
-        first, second = (_stacked([variable(table.over[k], signals) for table in tables]) for k in (0, -1))
-        found: jax.Array = interpolate(PackedTables(*(jnp.asarray(part) for part in packed)), first, second, jnp)
-        return found
+    def added(signals: Signals) -> dict[str, jax.Array]:
+        at = jnp.stack(jnp.broadcast_arrays(*(variable(name, signals) for name in variables_of(places))), -1)
+        found = interpolate(places, PackedTables(*(jnp.asarray(part) for part in packed)), at, jnp)
+        return dict(zip(coefficients_of(places), jnp.unstack(found, axis=-1), strict=True))
 
     return added
-
-
-def _stacked(series: Sequence[jax.Array]) -> jax.Array:
-    """The variables (..., T) of T tables."""
-    return jnp.stack(jnp.broadcast_arrays(*series), -1)

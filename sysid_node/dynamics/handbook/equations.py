@@ -7,28 +7,25 @@ effects of a file are left out, and ``left_out`` names them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.model import Aircraft, Inertia, LookupTable
-from sysid_node.aircraft.names import COEFFICIENTS
+from sysid_node.aircraft.model import Aircraft, Inertia
 from sysid_node.dynamics.airflow import flow_rates, velocity_of
 from sysid_node.dynamics.atmosphere import dynamic_pressure, speed_of_sound
 from sysid_node.dynamics.attitude import down_of_euler, euler_rates
 from sysid_node.dynamics.coefficients import Coefficients, linear_coefficient, with_polar
 from sysid_node.dynamics.forces import force_and_moment, thrust_axes, thrust_line
-from sysid_node.dynamics.lookup import PackedTables, interpolate, pack
+from sysid_node.dynamics.lookup import interpolate
+from sysid_node.dynamics.packed_tables import PackedTables, Places, coefficients_of, pack, variables_of
 from sysid_node.dynamics.rigid_body import angular_acceleration, velocity_rate
 from sysid_node.dynamics.tables import full_thrust
 from sysid_node.dynamics.vector import Real, Vector
 
 Array = NDArray[np.float64]
-
-#: The variables of each table, and the tables.
-PackedByVariables = tuple[tuple[tuple[str, ...], ...], PackedTables]
 
 #: States of ``Equations.rates``: m/s, rad, rad/s.
 STATES = ("V", "alpha", "q", "theta", "beta", "p", "r", "phi")
@@ -63,41 +60,42 @@ class Equations:
         x |= state
         speed = x.pop("V", self.aircraft.reference.airspeed)
         x |= {"0": 1.0, "V": speed / self.aircraft.reference.airspeed}
-        looked = {**x, "V": speed, "Mach": speed / speed_of_sound(self.density, np)}
+        added = self._added({**x, "V": speed, "Mach": speed / speed_of_sound(self.density, np)})
         attached = 0.5 * (1.0 - np.tanh(self.stall["a1"] * (x["alpha"] - self.stall["alpha_star"])))
-        lift = self._sum("CL", x, looked) * _kirchhoff(attached, self.stall["depth"])
+        lift = self._sum("CL", x, added) * _kirchhoff(attached, self.stall["depth"])
         x = with_polar(x, lift)
         lost = self.stall["depth"] * (1.0 - attached)
         offset = self.aircraft.effect_values().get("lateral_asymmetry", {})
         return Coefficients(
             CL=lift,
-            CD=self._sum("CD", x, looked) + lost * self.stall["CD_X"],
-            CY=self._sum("CY", x, looked) + offset.get("CY_0", 0.0),
-            Cl=self._sum("Cl", x, looked) + offset.get("Cl_0", 0.0),
-            Cm=self._sum("Cm", x, looked) + lost * self.stall["Cm_X"],
-            Cn=self._sum("Cn", x, looked) + offset.get("Cn_0", 0.0),
+            CD=self._sum("CD", x, added) + lost * self.stall["CD_X"],
+            CY=self._sum("CY", x, added) + offset.get("CY_0", 0.0),
+            Cl=self._sum("Cl", x, added) + offset.get("Cl_0", 0.0),
+            Cm=self._sum("Cm", x, added) + lost * self.stall["Cm_X"],
+            Cn=self._sum("Cn", x, added) + offset.get("Cn_0", 0.0),
         )
 
-    def _sum(self, coefficient: str, x: Mapping[str, Real], looked: Mapping[str, Real]) -> Real:
+    def _sum(self, coefficient: str, x: Mapping[str, Real], added: Mapping[str, Real]) -> Real:
         names = self.aircraft.model_structure.get(coefficient, ())
-        total = linear_coefficient(
-            ((self.aircraft.derivatives[f"{coefficient}_{name}"].value, name) for name in names), x
-        )
-        tables = self._tables["throttle" in looked]
-        if coefficient in tables:
-            over, packed = tables[coefficient]
-            first = np.stack(np.broadcast_arrays(*(looked[names[0]] for names in over)), -1)
-            other = [looked[names[1]] if len(names) > 1 else 0.0 for names in over]
-            second = np.stack(np.broadcast_arrays(*other, np.zeros(first.shape[:-1]))[:-1], -1)
-            first = np.broadcast_to(first, second.shape)
-            total = total + interpolate(packed, first, second, np).sum(-1)
-        return total
+        terms = ((self.aircraft.derivatives[f"{coefficient}_{name}"].value, name) for name in names)
+        return linear_coefficient(terms, x) + added.get(coefficient, 0.0)
+
+    def _added(self, x: Mapping[str, Real]) -> dict[str, Real]:
+        """What the tables add to each coefficient that has any; those over the throttle where it is given."""
+        packed = self._tables["throttle" in x]
+        if packed is None:
+            return {}
+        places, tables = packed
+        at = np.stack(np.broadcast_arrays(*(x[name] for name in variables_of(places))), -1)
+        return dict(zip(coefficients_of(places), np.moveaxis(interpolate(places, tables, at, np), -1, 0), strict=True))
 
     @cached_property
-    def _tables(self) -> tuple[dict[str, PackedByVariables], dict[str, PackedByVariables]]:
-        """By coefficient, the variables of each table and all tables in one; without and with those over throttle."""
+    def _tables(self) -> tuple[tuple[Places, PackedTables] | None, tuple[Places, PackedTables] | None]:
+        """All tables in one; without and with those over the throttle."""
         every = self.aircraft.tables
-        return _packed([table for table in every if "throttle" not in table.over]), _packed(every)
+        chosen = ([table for table in every if "throttle" not in table.over], every)
+        without, of_all = (pack(tables) if tables else None for tables in chosen)
+        return without, of_all
 
     def rates(self, state: Array, controls: Mapping[str, float], thrust: float) -> Array:
         """Rates (8,) of ``STATES`` with controls (rad, by symbol) and thrust (N) held."""
@@ -126,15 +124,6 @@ class Equations:
         spun = angular_acceleration(_known_or_one(self.aircraft.inertia), turning, moment)
         roll_rate, pitch_rate, _ = euler_rates(phi, theta, turning, np)
         return np.array([faster, alpha_rate, spun.y, pitch_rate, beta_rate, spun.x, spun.z, roll_rate])
-
-
-def _packed(tables: Sequence[LookupTable]) -> dict[str, PackedByVariables]:
-    found = {}
-    for coefficient in COEFFICIENTS:
-        own = [table for table in tables if table.coefficient == coefficient]
-        if own:
-            found[coefficient] = (tuple(t.over for t in own), pack([(t.points, t.values) for t in own]))
-    return found
 
 
 def _known_or_one(inertia: Inertia) -> Inertia:

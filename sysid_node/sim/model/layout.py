@@ -18,7 +18,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
 from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.dynamics.linear_model import level_flight
-from sysid_node.dynamics.lookup import PackedTables, pack
+from sysid_node.dynamics.packed_tables import PackedTables, Places, pack
 from sysid_node.errors import InputError
 
 #: A scalar, or a time series of one: stations and effects work on either.
@@ -35,7 +35,7 @@ class ParameterLayout:
     controls: tuple[str, ...]  # aerodynamic controls: "elevator", ...
     symbols: tuple[str, ...]  # their symbols: "de", ...
     derivatives: tuple[str, ...]  # "CL_0", ...
-    tables: tuple[tuple[str, tuple[str, ...]], ...] = ()  # coefficient and variables of each lookup table
+    tables: Places = ()  # coefficient and variables of each lookup table, of those that are added up of each sum
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -79,7 +79,7 @@ _NOISE_OF = ("accel",) * 3 + ("gyro",) * 3 + ("attitude",) * 3 + ("airspeed", "a
 
 def layout_of(aircraft: Aircraft) -> ParameterLayout:
     """The layout of this aircraft."""
-    tables = tuple((table.coefficient, table.over) for table in aircraft.tables)
+    tables = pack(aircraft.tables)[0] if aircraft.tables else ()
     return ParameterLayout(tuple(aircraft.controls), aircraft.control_symbols, tuple(aircraft.derivatives), tables)
 
 
@@ -115,7 +115,7 @@ def model_of(aircraft: Aircraft) -> AircraftNumbers:
     model = AircraftNumbers(**{name: jnp.asarray(number, dtype=float) for name, number in numbers.items()})  # type: ignore[arg-type]
     if not aircraft.tables:
         return model
-    packed = pack([(table.points, table.values) for table in aircraft.tables])
+    _, packed = pack(aircraft.tables)
     return model._replace(tables=PackedTables(*(jnp.asarray(part) for part in packed)))
 
 
