@@ -19,7 +19,6 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.stated_effects import as_estimated
 from sysid_node.errors import InputError
 from sysid_node.flight.checks import AIRSPEED_LOW, DENSITY_LOW
-from sysid_node.online import pending_renewal
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.changes.detection import PIECE
 from sysid_node.online.changes.excited_segments import no_excited_segments
@@ -30,7 +29,8 @@ from sysid_node.online.regression import information, normal_equations
 from sysid_node.online.regression.derivative_index import derivative_index
 from sysid_node.online.regression.instruments import INSTRUMENTED, instrument_model
 from sysid_node.online.regression.mixed_estimation import believed_derivatives
-from sysid_node.online.segment_update import begin_segment, reach, renew
+from sysid_node.online.renewal import pending_renewal
+from sysid_node.online.renewal.segment_update import begin_segment, reach, renew
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.state import (
     ChangeWatch,

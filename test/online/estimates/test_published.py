@@ -15,9 +15,9 @@ from sysid_node.online import estimator
 from sysid_node.online.estimates.current_solution import current_solution
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.estimates.validity import STALE
-from sysid_node.online.pending_renewal import complete
+from sysid_node.online.renewal.pending_renewal import complete
+from sysid_node.online.renewal.segment_update import renew
 from sysid_node.online.replay import run
-from sysid_node.online.segment_update import renew
 from sysid_node.online.settings import METHODS, OnlineSettings
 from sysid_node.online.state import EstimatorState
 from sysid_node.online.types import SAMPLE_COLUMNS, DerivativeEstimate

@@ -9,7 +9,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.online import estimator
-from sysid_node.online.segment_solution import move_servos
+from sysid_node.online.renewal.servo_steps import move_servos
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.state import EstimatorState, completed
 from test.online.plant import fly, made_aircraft, multisteps

@@ -13,7 +13,7 @@ from plant import fly, made_aircraft, multisteps
 from sysid_node.aircraft.model import UncertainValue
 from sysid_node.online import estimator
 from sysid_node.online.changes.score_test import ReferenceEstimates
-from sysid_node.online.segment_information import measure_segment
+from sysid_node.online.renewal.segment_information import measure_segment
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.state import EstimatorState, completed, current_lines
 from sysid_node.online.systematic.corrected_lines import CorrectedLines, LineCorrection

@@ -18,7 +18,7 @@ from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 
-BAGS = Path(__file__).resolve().parents[2] / "bags"
+BAGS = Path(__file__).resolve().parents[3] / "bags"
 
 
 @pytest.mark.parametrize(("bag", "control"), [("cdfp_multistep", "aileron"), ("cdrw_random", "elevator")])

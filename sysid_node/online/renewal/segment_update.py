@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online import pending_renewal, servo_search
-from sysid_node.online.change_response import look_for_changes, memory, respond
 from sysid_node.online.changes import detection
 from sysid_node.online.changes.detection import PIECE, ChangeDecision, ChangeMonitor
 from sysid_node.online.changes.excited_segments import remember
 from sysid_node.online.frequency import sampled_transform
 from sysid_node.online.regression.heteroskedasticity import NoiseMoments
 from sysid_node.online.regression.information import edges, products
-from sysid_node.online.segment_information import fading, measure_noise_moments
-from sysid_node.online.segment_solution import solve_with_servos
+from sysid_node.online.renewal import pending_renewal, servo_search
+from sysid_node.online.renewal.change_response import look_for_changes, memory, respond
+from sysid_node.online.renewal.segment_information import fading, measure_noise_moments
+from sysid_node.online.renewal.servo_steps import solve_with_servos
 from sysid_node.online.state import EstimatorState, FinishedSums, Steps, completed, current_lines
 
 Array = NDArray[np.float64]

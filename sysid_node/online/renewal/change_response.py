@@ -11,8 +11,8 @@ from sysid_node.online.changes import detection
 from sysid_node.online.changes.detection import PIECE, ChangeDecision, ChangeMonitor, ChangeTests
 from sysid_node.online.changes.excited_segments import no_excited_segments, remember
 from sysid_node.online.frequency import sampled_transform
-from sysid_node.online.segment_information import fading, information_of, measure_noise_moments, no_information
-from sysid_node.online.segment_solution import solve_with_servos
+from sysid_node.online.renewal.segment_information import fading, information_of, measure_noise_moments, no_information
+from sysid_node.online.renewal.servo_steps import solve_with_servos
 from sysid_node.online.state import EstimatorState, Steps, current_lines
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from sysid_node.online.frequency import sampled_transform
-from sysid_node.online.segment_information import fading
+from sysid_node.online.renewal.segment_information import fading
 from sysid_node.online.state import EstimatorState, PendingRenewal, Steps, completed, current_lines
 
 AFTER = 0.2  # s of data after which a renewal counts

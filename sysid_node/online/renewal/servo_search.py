@@ -22,8 +22,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid_node.online import segment_solution
-from sysid_node.online.segment_information import measure_segment
+from sysid_node.online.renewal import segment_solution, servo_steps
+from sysid_node.online.renewal.segment_information import measure_segment
 from sysid_node.online.state import ChangeWatch, EstimatorState, Steps, current_lines
 from sysid_node.online.systematic import estimation
 from sysid_node.online.systematic.consider import Fit
@@ -85,14 +85,14 @@ def _elsewhere(state: EstimatorState, found: SystematicErrors, control: int) -> 
     for order in range(3):
         taken_out[imperfect.servos.start + order * len(imperfect.controls) + control] = 0.0
     for left in reversed(range(STEPS)):
-        yield from segment_solution.move_servos(trial, servos)
+        yield from servo_steps.move_servos(trial, servos)
         lines = current_lines(trial)
         if left == STEPS - 1:
             place = replace(found, taken_out=taken_out)
             yield from segment_solution.solve_all(trial, measure_segment(trial, lines), (place, 1.0))
             there_found = segment_solution.last_errors(trial)
         else:
-            there_found = yield from segment_solution.look(trial, lines)
+            there_found = yield from servo_steps.look(trial, lines)
         if there_found is None or trial.controls.servos is None:
             return None
         step = estimation.notable_step(imperfect, trial.controls.servos, there_found)
@@ -125,7 +125,7 @@ def _take(state: EstimatorState, trial: EstimatorState) -> Steps[None]:
     """Go on with the solution of a ``trial``."""
     assert trial.controls.servos is not None
     if trial.controls.servos is not state.controls.servos:
-        yield from segment_solution.move_servos(state, trial.controls.servos)
+        yield from servo_steps.move_servos(state, trial.controls.servos)
     state.equations, state.latest = trial.equations, trial.latest
     state.segment.information = trial.segment.information
     state.changes.monitor.add_reference(trial.changes.monitor.references[-1])

@@ -1,0 +1,110 @@
+"""The solution of all equations of a renewal, the covariance of its errors, and how far instruments are trusted."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sysid_node.online.alignment import flow_angle_errors
+from sysid_node.online.frequency.regression_signals import OFFSET
+from sysid_node.online.regression import (
+    gust_correlation,
+    least_squares,
+    normal_equations,
+    regressor_noise,
+    weak_instruments,
+)
+from sysid_node.online.regression.information import Information
+from sysid_node.online.regression.least_squares import InstrumentStrength, Solution, Uncertainty
+from sysid_node.online.regression.normal_equations import NormalEquations
+from sysid_node.online.regression.selection_bias import selection_bias_factors
+from sysid_node.online.renewal.segment_information import line_seconds
+from sysid_node.online.state import EstimatorState, InstrumentChecks
+
+Array = NDArray[np.float64]
+
+
+class SolvedEquations(NamedTuple):
+    """The solution of all equations, and how far it can be trusted."""
+
+    solution: Solution
+    compensation: Array | None  # noise's part of the normal equations
+    noise: Array | None  # (W, W) of which that was made, per line and second
+    spread: Uncertainty
+    inflation: Array  # (C,) factors of the variances by gusts
+    instruments: InstrumentChecks
+
+
+def solved_equations(state: EstimatorState, total: Information, gram: Array) -> SolvedEquations:
+    """By the equations that the instruments' strength allows, which are the state's from now on."""
+    strength, solution, compensation, noise = _solve(state, total, gram)
+    equations = state.equations
+    spread = least_squares.uncertainty(equations, solution, total)
+    noise_alone = spread.covariance
+    if state.flow.active:
+        spread.covariance = noise_alone + _reconstruction_covariance(state, solution, total)
+    gusts = _gust_shares(state, total, equations, solution, spread)
+    checks = _instrument_checks(state, total, gram, strength, solution, spread, noise_alone, gusts)
+    return SolvedEquations(solution, compensation, noise, spread, gust_correlation.inflation(spread, gusts), checks)
+
+
+def _solve(
+    state: EstimatorState, total: Information, gram: Array
+) -> tuple[InstrumentStrength, Solution, Array | None, Array | None]:
+    """The instruments' strength, the solution by the equations that it allows, and the noise's part in them.
+
+    The last is the noise's Gram matrix (W, W) per line and second.
+    """
+    full, last = state.model.equations, state.latest
+    instrument_strength = least_squares.instrument_strength(full, least_squares.solve(full, gram), total)
+    equations = state.equations = normal_equations.with_strong_instruments(full, instrument_strength.strength)
+    compensation, noise, amount = None, None, line_seconds(state, total)
+    if last is not None and last.solution.usable:
+        noise = total.bias / amount
+        share = regressor_noise.allowed(equations, last.solution, last.uncertainty.density, noise)
+        noise = noise * share[:, None] * share
+        compensation = least_squares.bias_of(equations, amount * noise)
+    solution = least_squares.solve(equations, gram, compensation)
+    if compensation is not None and not solution.usable:
+        solution, compensation, noise = least_squares.solve(equations, gram), None, None
+    return instrument_strength, solution, compensation, noise
+
+
+def _instrument_checks(
+    state: EstimatorState,
+    total: Information,
+    gram: Array,
+    strength: InstrumentStrength,
+    solution: Solution,
+    spread: Uncertainty,
+    noise_alone: Array,
+    gusts: Array,
+) -> InstrumentChecks:
+    """How far the instruments can be trusted; ``noise_alone`` (C, P, P) is the covariance that noise makes."""
+    equations, table = state.equations, state.model.table
+    mean = total.integrals[equations.columns] / max(float(total.integrals[OFFSET]), 1e-12)
+    return InstrumentChecks(
+        strength,
+        selection_bias_factors(equations, solution, spread, strength, gram, *state.model.prior),
+        weak_instruments.anderson_rubin_bounds(equations, table, solution, gram, spread, noise_alone, mean, gusts),
+    )
+
+
+def _reconstruction_covariance(state: EstimatorState, solution: Solution, total: Information) -> Array:
+    """(C, P, P) covariance that errors of the aircraft file cause through reconstructed flow angles."""
+    model = state.model
+    return flow_angle_errors.reconstruction_covariance(
+        state.flow, state.transform.last, model.aircraft, model.layout, model.spectrum, state.equations, solution, total
+    )
+
+
+def _gust_shares(
+    state: EstimatorState, total: Information, equations: NormalEquations, solution: Solution, spread: Uncertainty
+) -> Array:
+    """(C,) share of the residuals that are gusts."""
+    aircraft, omega = state.model.aircraft, state.model.spectrum.omega
+    per_line, step = total.bias / line_seconds(state, total), total.energy / max(total.samples, 1.0)
+    sensed = gust_correlation.sensed(aircraft, equations, solution, per_line, total.noise_moments, step, omega)
+    return gust_correlation.share_of_gusts(spread, sensed)
