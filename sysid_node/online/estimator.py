@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,6 +129,22 @@ def _model(
     )
 
 
+def _tell_reconstructed_angles(state: EstimatorState) -> None:
+    """Take the imperfections as they are where the first sample has shown that flow angles are reconstructed."""
+    model, missing = state.model, state.flow.missing
+    if model.imperfections is None or missing is None or model.imperfections.reconstructed == missing:
+        return
+    found = imperfections(
+        model.aircraft,
+        model.layout,
+        commanded=model.sample.commanded,
+        positions=model.settings.actuators == "positions",
+        command_interval=model.sample.command_interval,
+        reconstructed=missing,
+    )
+    state.model = replace(model, imperfections=found or model.imperfections)
+
+
 def begin_with_commands(state: EstimatorState, time: float) -> EstimatorState:
     """An estimator that has seen nothing before ``time`` (s), when deflections begin to follow from commands.
 
@@ -161,6 +178,8 @@ def update(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
     sample, excess = _without_excess(state.model, sample)
     sample = flow_angle_filter.complete(state.flow, time, sample, state.model.settings.max_gap)
     inputs = state.inputs
+    if inputs.previous is None:
+        _tell_reconstructed_angles(state)
     if math.isnan(inputs.begin) and abs(time) < LIMIT:
         inputs.begin = first_counted(time, state.model.settings)
     if not time >= inputs.begin:

@@ -1,6 +1,7 @@
 """The kinematic equations of the flow-angle filter: rates of change, their Jacobian, velocities of other points.
 
-The state is u, v, w (m/s) of the IMU's point against the mean air, phi, theta (rad), and the biases of p and q (rad/s).
+The state is u, v, w (m/s) of the IMU's point against the mean air, phi, theta (rad), and the biases of p and q (rad/s)
+and of az (m/s^2).
 Source: Klein & Morelli (2006), "Aircraft System Identification", eqs. 3.33 and 3.34, over specific forces.
 """
 
@@ -20,9 +21,9 @@ Array = NDArray[np.float64]
 
 def rates_of_change(x: Sequence[float], imu: Sequence[float]) -> tuple[float, float, float, float, float]:
     """Rates of change of u v w phi theta by the IMU's reading ax ay az (m/s^2) p q r (rad/s)."""
-    u, v, w, phi, theta, bias_p, bias_q = x
+    u, v, w, phi, theta, bias_p, bias_q, bias_az = x
     ax, ay, az, p, q, r = imu[:6]
-    p, q = p - bias_p, q - bias_q
+    p, q, az = p - bias_p, q - bias_q, az - bias_az
     sin_phi, cos_phi, sin_theta, cos_theta = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
     return (
         ax - GRAVITY * sin_theta + r * v - q * w,
@@ -43,20 +44,21 @@ def integrated(x: Sequence[float], step: float, before: Sequence[float], now: Se
 
 
 def jacobian(x: Sequence[float], imu: Sequence[float]) -> Array:
-    """(7, 7) of ``rates_of_change`` by the state."""
-    u, v, w, phi, theta, bias_p, bias_q = x
+    """(8, 8) of ``rates_of_change`` by the state."""
+    u, v, w, phi, theta, bias_p, bias_q, _ = x
     p, q, r = imu[3] - bias_p, imu[4] - bias_q, imu[5]
     sp, cp, st, ct = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
     tilt = st / ct
     return np.array(
         [
-            [0.0, r, -q, 0.0, -GRAVITY * ct, 0.0, w],
-            [-r, 0.0, p, GRAVITY * cp * ct, -GRAVITY * sp * st, -w, 0.0],
-            [q, -p, 0.0, -GRAVITY * sp * ct, -GRAVITY * cp * st, v, -u],
-            [0.0, 0.0, 0.0, tilt * (q * cp - r * sp), (q * sp + r * cp) / ct**2, -1.0, -tilt * sp],
-            [0.0, 0.0, 0.0, -q * sp - r * cp, 0.0, 0.0, -cp],
-            [0.0] * 7,
-            [0.0] * 7,
+            [0.0, r, -q, 0.0, -GRAVITY * ct, 0.0, w, 0.0],
+            [-r, 0.0, p, GRAVITY * cp * ct, -GRAVITY * sp * st, -w, 0.0, 0.0],
+            [q, -p, 0.0, -GRAVITY * sp * ct, -GRAVITY * cp * st, v, -u, -1.0],
+            [0.0, 0.0, 0.0, tilt * (q * cp - r * sp), (q * sp + r * cp) / ct**2, -1.0, -tilt * sp, 0.0],
+            [0.0, 0.0, 0.0, -q * sp - r * cp, 0.0, 0.0, -cp, 0.0],
+            [0.0] * 8,
+            [0.0] * 8,
+            [0.0] * 8,
         ]
     )
 

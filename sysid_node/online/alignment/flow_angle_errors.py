@@ -1,4 +1,7 @@
-"""What errors of the aircraft file and of the IMU do to derivatives through reconstructed flow angles."""
+"""What errors of the aircraft file's derivatives do to the estimates through reconstructed flow angles.
+
+Errors of the instruments, which the angles are integrals of, are among the imperfections (``systematic.sources``).
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.online.alignment.flow_angle_filter import FlowAngleFilter
 from sysid_node.online.frequency.regression_signals import OFFSET, SignalLayout
 from sysid_node.online.regression.information import Information, Spectrum
@@ -28,7 +30,7 @@ def reconstruction_covariance(
     solution: Solution,
     info: Information,
 ) -> Array:
-    """(C, P, P) covariance by which errors of file and IMU reach the unknowns through the reconstructed angles.
+    """(C, P, P) covariance by which errors of the file reach the unknowns through the reconstructed angles.
 
     An error e of a regressor moves the solution by theta (Z'A)^-1 Z'e. Only the energy of e is known, so its largest
     possible effect (the Cauchy-Schwarz inequality) is counted. ``at``: time in s.
@@ -68,42 +70,7 @@ def _error_energies(
         means = info.integrals / max(float(info.integrals[OFFSET]), 1e-9)
         per_rate = 2.0 * aircraft.reference.airspeed / aircraft.geometry.b
         energies[1] += float(means**2 @ errors[0] ** 2) * per_rate**2 * float(integrated[layout.column("p")])
-    more = _instruments_energies(aircraft, layout, lines, info)
-    return [energy + further for energy, further in zip(energies, more, strict=True)]
-
-
-def _instruments_energies(
-    aircraft: Aircraft, layout: SignalLayout, lines: Spectrum, info: Information
-) -> tuple[float, float]:
-    """Energies over the lines of the errors of alpha and beta that scales and mounting of the instruments make.
-
-    The angles are integrals of d alpha/dt = q + az / V and d beta/dt = -r + (ay + g phi) / V (Klein & Morelli, 2006,
-    eq. 3.33, at small angles). Both terms of each are much larger than their sum: the scale of one of them shows in it.
-    """
-    g, reference, known = aircraft.geometry, aircraft.reference, aircraft.tolerances
-    V, diagonals = reference.airspeed, info.grams.diagonal(axis1=1, axis2=2)
-    once, twice = (
-        np.array([np.mean(lines.omega[b] ** power) for b in lines.bands]) @ diagonals for power in (-2.0, -4.0)
-    )
-    per_force = dynamic_pressure(reference.air_density, V) * g.S / (aircraft.mass * V)  # rad/s per unit of coefficient
-    units = {"p": 2.0 * V / g.b, "q": 2.0 * V / g.cbar, "r": 2.0 * V / g.b, "CL": per_force, "CY": per_force}
-
-    def energy(name: str, integrals: Array = once) -> float:
-        return units[name] ** 2 * float(integrals[layout.column(name)]) if name in layout.names else 0.0
-
-    def squares(*keys: str) -> float:
-        return sum(known.get(key, 0.0) ** 2 for key in keys)
-
-    roll, pitch, yaw = (squares(f"imu_misalignment.{axis}") for axis in ("roll", "pitch", "yaw"))
-    exact = aircraft.ideal and "noise.bias.airspeed" not in aircraft.stated_tolerances
-    bias = 0.0 if exact else aircraft.noise_bias.get("airspeed", 0.0)
-    airspeed = squares("airspeed_scale.error") + (bias / V) ** 2
-    alpha = squares("imu_scale.q") * energy("q") + yaw * energy("p") + roll * (energy("r") + energy("CY"))
-    alpha += (squares("imu_scale.az") + airspeed) * energy("CL")
-    beta = squares("imu_scale.r") * energy("r") + pitch * energy("p") + roll * (energy("q") + energy("CL"))
-    beta += (squares("imu_scale.ay") + airspeed) * energy("CY")
-    beta += (GRAVITY / V) ** 2 * (squares("imu_scale.p") + airspeed) * energy("p", twice)
-    return alpha, beta
+    return energies
 
 
 def _angle_errors(aircraft: Aircraft, layout: SignalLayout, coefficient: str, angle: str) -> Array:

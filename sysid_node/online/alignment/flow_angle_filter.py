@@ -2,7 +2,7 @@
 
 Within the lines' band the angles are the integrals of the kinematic equations (Klein & Morelli 2006, eqs. 3.33 and
 3.34; flight path reconstruction: ibid., ch. 10): the velocity of the IMU's own point, so that no angular acceleration
-is needed, with an attitude of the filter's own. What integration cannot know (the gyros' biases, attitude, slow drift)
+is needed, with an attitude of the filter's own. What integration cannot know (biases, attitude, slow drift)
 is estimated by an extended Kalman filter from three slow references: the airspeed, the angle of attack at which the
 aircraft file's lift is the measured one, and the sideslip at which its side force is. The references' noise densities
 are those of light to moderate gusts, which puts the filter's bandwidth well below the lines' band. The references, and
@@ -98,7 +98,7 @@ class Innovations:
 
 @dataclass
 class FlowAngleFilter:
-    """The filter: u v w m/s of the IMU's point against the mean air, phi theta rad, biases of p and q rad/s."""
+    """The filter: u v w m/s of the IMU's point against the mean air, phi theta rad, biases: p, q rad/s, az m/s^2."""
 
     model: FlowAngleModel | None  # None: the aircraft file has no lift slope or no side-force slope
     missing: tuple[bool, bool] | None = None  # whether alpha, beta are not measured; None = no sample has come yet
@@ -207,16 +207,16 @@ def _angles(
 def _begin(filter_: FlowAngleFilter, model: FlowAngleModel, time: float, sample: Sequence[float]) -> None:
     """Start at the file's angle of attack, without sideslip, in a coordinated turn at constant airspeed."""
     ax, ay, az, _, _, r, V = sample[:7]
-    alpha = max(min(reference_angles(model, sample, 0.0, (0.0, 0.0))[0], 0.3), -0.3)
+    alpha = max(min(reference_angles(model, sample, 0.0, (0.0, 0.0, 0.0))[0], 0.3), -0.3)
     climb = max(min((ax * math.cos(alpha) + az * math.sin(alpha)) / GRAVITY, 0.5), -0.5)
     bank = math.atan2(V * r - ay, GRAVITY)
     filter_.state = [
         *velocity_of((V, alpha, 0.0), scalar),
         bank,
         alpha + math.asin(climb),
-        *(filter_.state[5:] or (0.0, 0.0)),
+        *(filter_.state[5:] or (0.0, 0.0, 0.0)),
     ]
-    spread = [1.0, _FLOW * V, _FLOW * V, _ATTITUDE, _ATTITUDE, _BIAS, _BIAS]
+    spread = [1.0, _FLOW * V, _FLOW * V, _ATTITUDE, _ATTITUDE, _BIAS, _BIAS, model.bias_az]
     filter_.covariance = np.diag(np.square(spread))
     filter_.innovations = Innovations(time)
 
@@ -245,11 +245,11 @@ def _correct(filter_: FlowAngleFilter, model: FlowAngleModel, time: float, air_i
     The airspeed is new every ``air_interval`` s.
     """
     span, x = time - filter_.innovations.since, filter_.state
-    transition = np.eye(7) + span * jacobian(x, filter_.imu)
+    transition = np.eye(8) + span * jacobian(x, filter_.imu)
     P = transition @ filter_.covariance @ transition.T + span * np.diag(model.walks)  # P = F P F' + Q
     u, v, w = x[:3]
     V = math.sqrt(u * u + v * v + w * w)
-    H = np.zeros((3, 7))
+    H = np.zeros((3, 8))
     H[0, :3] = u / V, v / V, w / V
     H[1, :3] = -w / (u * u + w * w), 0.0, u / (u * u + w * w)
     H[2, 1] = 1.0 / V
@@ -258,7 +258,7 @@ def _correct(filter_: FlowAngleFilter, model: FlowAngleModel, time: float, air_i
     mean = np.array(filter_.innovations.sums) / filter_.innovations.count
     filter_.state = (np.array(x) + gain @ mean).tolist()
     gains = (gain[2, 1] / (V * span)) ** 2, (gain[1, 2] / (V * span)) ** 2, 1.0
-    kept = np.eye(7) - gain @ H
+    kept = np.eye(8) - gain @ H
     filter_.covariance = kept @ P @ kept.T + (gain * R) @ gain.T  # Joseph's form
     filter_.innovations = Innovations(time)
     noise = model.airspeed_noise**2 * air_interval / (span * V * V)

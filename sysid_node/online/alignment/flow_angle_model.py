@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.dynamics.atmosphere import dynamic_pressure
+from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.dynamics.forces import lift_and_drag
 from sysid_node.dynamics.linearised import linear_derivatives
 from sysid_node.online.types import SAMPLE_COLUMNS
@@ -22,6 +22,7 @@ MIDDLE = 2.0 * math.pi * 0.5  # rad/s: middle of the band, where the integrated 
 CONTROLS = len(SAMPLE_COLUMNS)  # place of the first control in a sample
 #: Random walks beyond the sensors' noise: velocity m/s, attitude rad, gyro biases rad/s, each per sqrt(s).
 _WALKS = (0.02, 0.001, 5e-5)
+_BIAS_CHANGES = 3600.0  # s in which the bias of az changes by as much as it is not known at the start
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ class FlowAngleModel:
     half_chord: float  # m
     airspeed: float  # m/s, reference
     airspeed_noise: float  # m/s
-    walks: Array  # (7,) densities of the states' random walks, per s
+    bias_az: float  # m/s^2: 1 sigma of the constant error of az
+    walks: Array  # (8,) densities of the states' random walks, per s
     interval: float  # s a squared s: between vane readings as noisy as the integrals, over the IMU's interval
 
 
@@ -62,6 +64,9 @@ def flow_angle_model(aircraft: Aircraft) -> FlowAngleModel | None:
     velocity, attitude, bias = _WALKS
     noise, g, imu, probe = aircraft.noise, aircraft.geometry, aircraft.sensors.imu, aircraft.sensors.air_data
     integrated = (noise["gyro"] ** 2 + (noise["accel"] / aircraft.reference.airspeed) ** 2) / MIDDLE**2
+    # the scale's error is a bias, too, for az is about the weight
+    known = aircraft.tolerances
+    bias_az = math.hypot(known.get("imu_bias.az", 0.0), GRAVITY * known.get("imu_scale.az", 0.0))
     return FlowAngleModel(
         lift=_linear(aircraft, "CL", "alpha"),
         side=_linear(aircraft, "CY", "beta"),
@@ -72,7 +77,8 @@ def flow_angle_model(aircraft: Aircraft) -> FlowAngleModel | None:
         half_chord=0.5 * g.cbar,
         airspeed=aircraft.reference.airspeed,
         airspeed_noise=noise["airspeed"],
-        walks=np.array([velocity] * 3 + [attitude] * 2 + [bias] * 2) ** 2,
+        bias_az=bias_az,
+        walks=np.array([velocity] * 3 + [attitude] * 2 + [bias] * 2 + [bias_az / math.sqrt(_BIAS_CHANGES)]) ** 2,
         interval=integrated / max(noise["alpha"], noise["beta"], FINEST) ** 2,
     )
 
@@ -90,10 +96,10 @@ def reference_angles(
 ) -> tuple[float, float]:
     """Alpha and beta (rad) at which the file's lift and side force are those that the IMU measures.
 
-    ``alpha`` (rad) turns the body axes to the stability axes; ``biases`` (rad/s) are the gyros' of p and q.
+    ``alpha`` (rad) turns the body axes to the stability axes; ``biases`` are those of p and q (rad/s) and az (m/s^2).
     """
     ax, ay, az, p, q, r, V = sample[:7]
-    p, q = p - biases[0], q - biases[1]
+    p, q, az = p - biases[0], q - biases[1], az - biases[2]
     scale = model.mass_over_area / dynamic_pressure(sample[9], V)
     lift = scale * lift_and_drag(ax, az, math.cos(alpha), math.sin(alpha))[0]
     rates = (p * model.half_span / V, q * model.half_chord / V, r * model.half_span / V)

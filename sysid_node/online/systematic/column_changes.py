@@ -3,24 +3,30 @@
 A signal about its mean changes by sums of other signals and of their rates. All signals carry the factor k = qbar /
 qbar0, so a column stands for its quantity times the mean k. The means change apart, which matters to the offsets alone:
 C_0 = mean of the coefficient - sum of C_j times the mean of x_j.
+
+A flow angle that no vane measures is the integral of what the IMU reads (``flow_angle_filter``): d alpha/dt = q + az /
+V, d beta/dt = -r + (ay + g phi) / V and d phi/dt = p, at small angles (Klein & Morelli 2006, eqs. 3.33 and 3.34). Both
+terms are much larger than their sum, so that an error of one of them shows in it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.online.frequency.regression_signals import OFFSET, SignalLayout, momentum_matrix
 from sysid_node.online.systematic.cross_spectra import ServoColumns
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Terms = Mapping[str, tuple[float, float]]  # by signal: factors of it, and of its rate (s)
+Turn = Callable[[Terms, float], None]  # of a flow angle (rad): the terms that change it, and the change of its mean
 
 AXES = "xyz"
 RATES = "pqr"
@@ -57,6 +63,7 @@ class ColumnChanges:
     columns: ServoColumns
     means: FlightMeans
     count: int
+    reconstructed: tuple[bool, bool] = (False, False)  # whether alpha, beta are, as no vanes measure them
     signals: Array = field(init=False)  # (K, N, 2N) of each signal: factors of all signals, then j omega times them
     rates: Index = field(init=False)  # (N,) where the rate of each signal stands among these
     shifts: Array = field(init=False)  # (K, N) of the means
@@ -67,6 +74,8 @@ class ColumnChanges:
         self.signals, self.shifts = np.zeros((self.count, N, 2 * N)), np.zeros((self.count, N))
         self._place = {name: self.columns.place(i) for i, name in enumerate(self.layout.names)}
         self._place["0"] = OFFSET
+        for (name, order), place in self.columns.integrals.items():
+            self._place[_integral(name, order)] = place
         self.rates = self.columns.rates_of(self.layout)
         ratio = momentum_matrix(self.aircraft)
         self._momentum = {axis: dict(zip((*FORCES, *MOMENTS), ratio[i].tolist(), strict=True))
@@ -130,6 +139,51 @@ class ColumnChanges:
         """Change the sideslip (rad)."""
         self.add("beta", terms)
         self.shift("beta", mean)
+
+    def by_vane(self, angle: str) -> Turn:
+        """``turn_flow`` or ``turn_sideslip`` of an angle that a vane measures; else nothing is changed."""
+        return self._turn(angle, reconstructed=False)
+
+    def by_integration(self, angle: str) -> Turn:
+        """The same of an angle that is reconstructed."""
+        return self._turn(angle, reconstructed=True)
+
+    def _turn(self, angle: str, *, reconstructed: bool) -> Turn:
+        flow = angle == "alpha"
+        if self.reconstructed[0 if flow else 1] != reconstructed:
+            return _unchanged
+        return self.turn_flow if flow else self.turn_sideslip
+
+    def angles_by_rate(self, target: str, source: str, share: float) -> None:
+        """Change reconstructed angles, as the rate ``target`` is another by a ``share`` of ``source`` (rad/s)."""
+        factor = share * self.means.k * self.per_column(source)
+        if target == "q":
+            self.by_integration("alpha")({_integral(source, 1): (factor, 0.0)}, 0.0)
+        elif target == "r":
+            self.by_integration("beta")({_integral(source, 1): (-factor, 0.0)}, 0.0)
+        else:
+            self.by_integration("beta")({_integral(source, 2): (factor * GRAVITY / self.airspeed, 0.0)}, 0.0)
+
+    def angles_by_force(self, axis: str, terms: Terms) -> None:
+        """Change reconstructed angles, as the specific force along a body axis is another by ``terms`` of force."""
+        reference, g = self.aircraft.reference, self.aircraft.geometry
+        per_force = dynamic_pressure(reference.air_density, reference.airspeed) * g.S / self.aircraft.mass  # m/s^2
+        factor = self.means.k * per_force / self.airspeed
+        if axis != "X":
+            changed = {_integral(name, 1): (factor * plain, 0.0) for name, (plain, _) in terms.items()}
+            self.by_integration("alpha" if axis == "Z" else "beta")(changed, 0.0)
+
+    def mean_sideslip(self, side_force: float) -> None:
+        """Change a reconstructed sideslip, whose mean is that at which the file has the ``side_force`` coefficient.
+
+        An error of it is turned into the angle of attack by the roll rate: w' = ... - p v.
+        """
+        slope = self.aircraft.derivatives.get("CY_beta")
+        if slope is not None and slope.value:
+            off = side_force / slope.value
+            self.by_integration("beta")({}, off)
+            factor = -off * self.means.k * self.per_column("p")
+            self.by_integration("alpha")({_integral("p", 1): (factor, 0.0)}, 0.0)
 
     def airspeed_varies(self, terms: Terms) -> None:
         """Change the airspeed's variation; ``terms`` make its share of the mean airspeed, times the mean k."""
@@ -217,6 +271,14 @@ class ColumnChanges:
         if square is not None:
             self.signals[:, square] += 2.0 * mean * self.signals[:, lift]
             self.shifts[:, square] += 2.0 * mean * self.shifts[:, lift]
+
+
+def _integral(name: str, order: int) -> str:
+    return f"{name} integrated" if order == 1 else f"{name} integrated twice"
+
+
+def _unchanged(terms: Terms, mean: float) -> None:
+    """Nothing changes."""
 
 
 def _times(terms: Terms, factor: float) -> dict[str, tuple[float, float]]:

@@ -91,6 +91,8 @@ class LineCorrection:
         lines[:, columns.servos] = servo_model.rate_gain(self.servos, omega) * np.concatenate([rates, rates], axis=1)
         if model is not None and model.gains.shape[1]:
             lines[:, columns.instruments] = (model.gains @ lines[:, model.controls, None])[..., 0]
+        if columns.integrals:
+            lines[:, columns.instruments.stop :] = columns.integral_gain(omega) * lines[:, columns.integrands]
         return lines
 
 

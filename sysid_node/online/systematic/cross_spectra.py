@@ -3,12 +3,13 @@
 Per line, S_ij = sum over segments of conj(X_i) X_j. It adds up over segments and fades like the Gram matrices, whose
 sum over the lines' real parts it is; but as it keeps the phases, the Gram matrix after any filtering of any signal
 follows from it: nothing is transformed again, and no samples are kept. T signals are transformed, some of which are
-rates of others; behind them stand the m controls' changes with their servos' lateness, and the I instruments, which are
-made of the controls.
+rates of others; behind them stand the m controls' changes with their servos' lateness, the I instruments, which are
+made of the controls, and, where no vanes measure the flow angles, J integrals of which the reconstructed angles are.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,9 @@ from sysid_node.online.regression.instruments import InstrumentModel
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+#: What is integrated where no vanes are, and how often.
+INTEGRATED = (("p", 1), ("q", 1), ("r", 1), ("CL", 1), ("CY", 1), ("p", 2))
 
 
 def cross_spectra(clean: Array) -> Complex:
@@ -36,15 +40,25 @@ class ServoColumns:
     rates: slice  # of the rates
     servos: slice  # of the m controls' changes with lateness, and behind them of these changes' second derivatives
     instruments: slice
+    integrals: Mapping[tuple[str, int], int]  # places of integrals, by signal and how often it is integrated
+    integrands: tuple[int, ...]  # (J,) places of these signals
     width: int
 
     @classmethod
-    def of(cls, layout: SignalLayout) -> ServoColumns:
-        """Those of a signal vector's ``layout``."""
+    def of(cls, layout: SignalLayout, *, integrals: bool = False) -> ServoColumns:
+        """Those of a signal vector's ``layout``; with ``integrals``, where no vanes are."""
         W, R, m, made = layout.transformed, len(layout.differentiated), len(layout.timed), len(layout.instrumented)
         T = W + R
         S = T + 2 * m
-        return cls(T, slice(W, T), slice(T, S), slice(S, S + made), S + made)
+        found = [each for each in INTEGRATED if integrals and each[0] in layout.names]
+        places = {each: S + made + j for j, each in enumerate(found)}
+        integrands = tuple(layout.column(name) for name, _ in found)
+        return cls(T, slice(W, T), slice(T, S), slice(S, S + made), places, integrands, S + made + len(found))
+
+    def integral_gain(self, omega: Array) -> Complex:
+        """(F, J) what integrating makes of the signals' lines at ``omega`` (F,) rad/s."""
+        orders = np.array([order for _, order in self.integrals], dtype=int)
+        return np.asarray((1.0 / (1j * omega[:, None])) ** orders)
 
     def place(self, column: int) -> int:
         """Where a column of the signal vector stands."""
@@ -95,6 +109,9 @@ def _fill(
         rows[:, columns.servos] = rate_gain.conj()[:, :, None] * both
     if model.gains.shape[1]:
         rows[:, columns.instruments] = model.gains.conj() @ rows[:, controls]
+    if columns.integrals:
+        gain = columns.integral_gain(omega).conj()
+        rows[:, columns.instruments.stop :] = gain[:, :, None] * rows[:, columns.integrands]
 
 
 def band_moments(spectra: Complex, omega: Array, bands: tuple[slice, ...]) -> Array:

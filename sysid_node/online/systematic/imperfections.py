@@ -60,6 +60,7 @@ class Imperfections:
     step_time: float  # s: 1 sigma of the time of steps in a log's commands
     limits: Array  # (m,) s: 1 sigma of how late the rate limits have made the controls in the flight
     places: Index  # (W,) where the columns of the signal vector stand among them
+    reconstructed: tuple[bool, bool] = (False, False)  # whether alpha, beta are, as no vanes measure them
 
     @cached_property
     def keys(self) -> tuple[str, ...]:
@@ -78,15 +79,22 @@ class Imperfections:
 
 
 def imperfections(
-    aircraft: Aircraft, layout: SignalLayout, *, commanded: bool, positions: bool, command_interval: float = 0.0
+    aircraft: Aircraft,
+    layout: SignalLayout,
+    *,
+    commanded: bool,
+    positions: bool,
+    command_interval: float = 0.0,
+    reconstructed: tuple[bool, bool] = (False, False),
 ) -> Imperfections | None:
     """Those of an aircraft file; None where it states that all is exact.
 
     ``commanded``: the deflections follow from commands by the file's servos. ``positions``: they are known to be
     measured, so that no servo comes after them. Where neither is known, they may be either. ``command_interval`` (s) is
-    that between a log's commands where lines stand between them (``JointStream``).
+    that between a log's commands where lines stand between them (``JointStream``). ``reconstructed``: whether alpha,
+    beta are, as no vanes measure them.
     """
-    found = sources(aircraft)
+    found = sources(aircraft, reconstructed)
     unseen = _time_of_steps(command_interval) if commanded else 0.0
     servos = dict(zip(aircraft.control_symbols, servos_of(aircraft)[1:], strict=True))
     of_controls = [servos[symbol] for symbol in layout.timed]
@@ -94,7 +102,7 @@ def imperfections(
     rows = [] if positions else _uncertain_servos(aircraft, layout, of_controls, unseen, commanded=commanded)
     if not found and not rows:
         return None
-    columns = ServoColumns.of(layout)
+    columns = ServoColumns.of(layout, integrals=any(reconstructed))
     controls, timed, expected, sigmas, damped, silent = zip(*rows, strict=True) if rows else ((),) * 6
     unknown = np.flatnonzero(silent)
     applied = np.array(stated).reshape(-1, 3) if commanded else np.zeros((len(layout.timed), 3))
@@ -112,6 +120,7 @@ def imperfections(
         unseen,
         np.zeros(len(controls)),
         np.array([columns.place(i) for i in range(layout.width)], np.intp),
+        reconstructed,
     )
 
 
@@ -209,7 +218,7 @@ def column_changes(
     """What one unit of each imperfection changes, by the signals' ``integrals`` (W,)."""
     means = flight_means(layout, integrals)
     count = len(imperfect.sources) + 3 * len(imperfect.controls)
-    changes = ColumnChanges(aircraft, layout, imperfect.columns, means, count)
+    changes = ColumnChanges(aircraft, layout, imperfect.columns, means, count, imperfect.reconstructed)
     for i, source in enumerate(imperfect.sources):
         changes.at = i
         describe(changes, source)

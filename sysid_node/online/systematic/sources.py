@@ -41,14 +41,19 @@ class ErrorSource:
         return self.key.rpartition(".")[0] or self.key
 
 
-def sources(aircraft: Aircraft, *, vanes: bool = True) -> tuple[ErrorSource, ...]:
-    """All imperfections of an aircraft but its servos; without those of the flow angles where no ``vanes`` are."""
+def sources(aircraft: Aircraft, reconstructed: tuple[bool, bool] = (False, False)) -> tuple[ErrorSource, ...]:
+    """All imperfections of an aircraft but its servos.
+
+    Without those of the vanes for alpha, beta where these are ``reconstructed``.
+    """
+    absent = [angle for angle, missing in zip(("alpha", "beta"), reconstructed, strict=True) if missing]
+    no_vanes = {f"{kind}.{angle}" for kind in ("vane_scale", "vane_bias") for angle in absent}
     found = []
     tolerances, sizes = aircraft.tolerances, sizes_as_uncertainty(aircraft)
     for key in dict.fromkeys((*tolerances, *sizes)):
         sigma = float(tolerances.get(key, 0.0))
         source = _expected(aircraft, key, math.hypot(sigma, sizes[key]) if key in sizes else sigma)
-        seen = _change_of(source) is not None and (vanes or source.kind not in _FLOW)
+        seen = _change_of(source) is not None and key not in no_vanes
         if source.sigma > 0.0 and math.isfinite(source.sigma) and seen:
             found.append(source)
     bias = aircraft.noise_bias.get("airspeed", 0.0)
@@ -177,22 +182,23 @@ def _airspeed(changes: ColumnChanges, share: float) -> None:
     changes.shift("V", share * changes.means.of("V"))
     changes.rescale("k", -2.0 * share)
     _shift_coefficients(changes, -2.0 * share)
+    for axis, (terms, _) in changes.forces().items():  # the flow turns by the accelerations over the airspeed
+        changes.angles_by_force(axis, {n: (-share * a, 0.0) for n, (a, _) in terms.items()})
+    changes.angles_by_rate("p", "p", -share)
 
 
 def _vane_scale(changes: ColumnChanges, name: str, key: str) -> None:
-    turn = changes.turn_flow if name == "alpha" else changes.turn_sideslip
-    turn({name: (-1.0, 0.0)}, -changes.means.of(name))
+    changes.by_vane(name)({name: (-1.0, 0.0)}, -changes.means.of(name))
 
 
 def _vane_bias(changes: ColumnChanges, name: str, key: str) -> None:
-    turn = changes.turn_flow if name == "alpha" else changes.turn_sideslip
-    turn({}, -1.0)
+    changes.by_vane(name)({}, -1.0)
 
 
 def _air_data_late(changes: ColumnChanges, name: str, key: str) -> None:
     """The rates of what the probe measures: of the flow at the CG, and of its difference from the flow at the probe."""
-    changes.turn_flow({"alpha": (0.0, 1.0)}, 0.0)
-    changes.turn_sideslip({"beta": (0.0, 1.0)}, 0.0)
+    for angle in ("alpha", "beta"):
+        changes.by_vane(angle)({angle: (0.0, 1.0)}, 0.0)
     changes.airspeed_varies({"0": (0.0, 0.5)})  # k goes with the airspeed's square
     for along, arm in enumerate(changes.aircraft.sensors.air_data):
         for change, rate, share in _probe_flow(changes, along):
@@ -207,6 +213,8 @@ def _imu_late(changes: ColumnChanges, name: str, key: str) -> None:
         changes.add(moment, {moment: (0.0, 1.0), "0": (0.0, changes.means.of(moment))})
     for axis, (terms, mean) in changes.forces().items():
         changes.force(axis, {n: (0.0, a) for n, (a, _) in terms.items()} | {"0": (0.0, mean)})
+    for angle in ("alpha", "beta"):
+        changes.by_integration(angle)({angle: (0.0, 1.0)}, 0.0)
 
 
 def _actuators_late(changes: ColumnChanges, name: str, key: str) -> None:
@@ -217,10 +225,17 @@ def _actuators_late(changes: ColumnChanges, name: str, key: str) -> None:
 def _imu_scale(changes: ColumnChanges, name: str, key: str) -> None:
     if name in RATES:
         changes.rate(name, name, -1.0)
+        changes.angles_by_rate(name, name, -1.0)
         return
     axis = name[-1].upper()
     terms, mean = changes.forces()[axis]
-    changes.force(axis, {n: (-a, -b) for n, (a, b) in terms.items()}, -mean)
+    _reading(changes, axis, {n: (-a, -b) for n, (a, b) in terms.items()}, -mean)
+
+
+def _reading(changes: ColumnChanges, axis: str, terms: Terms, mean: float) -> None:
+    """The force along a body axis is another than the accelerometers say."""
+    changes.force(axis, terms, mean)
+    changes.angles_by_force(axis, terms)
 
 
 def _imu_bias(changes: ColumnChanges, name: str, key: str) -> None:
@@ -229,6 +244,8 @@ def _imu_bias(changes: ColumnChanges, name: str, key: str) -> None:
         return
     mean = -_per_acceleration(changes) / changes.means.k
     changes.force(name[-1].upper(), {"0": (-mean, 0.0)}, mean)  # constant, while the mean goes with k
+    if name == "ay":
+        changes.mean_sideslip(mean)
 
 
 def _per_acceleration(changes: ColumnChanges) -> float:
@@ -243,8 +260,16 @@ def _imu_misalignment(changes: ColumnChanges, name: str, key: str) -> None:
     forces = changes.forces()
     for target, source, sign in ((one, other, -1.0), (other, one, 1.0)):
         terms, mean = forces[FORCES[source]]
-        changes.force(FORCES[target], {n: (sign * a, sign * b) for n, (a, b) in terms.items()}, sign * mean)
+        turned = {n: (sign * a, sign * b) for n, (a, b) in terms.items()}
+        changes.force(FORCES[target], turned, sign * mean)
         changes.rate(RATES[target], RATES[source], sign)
+        if name != "roll":
+            changes.angles_by_force(FORCES[target], turned)
+            changes.angles_by_rate(RATES[target], RATES[source], sign)
+    if name == "roll":  # bank follows from the readings and turns with them, and so do both angles
+        changes.by_integration("alpha")({"beta": (1.0, 0.0)}, 0.0)
+        changes.by_integration("beta")({"alpha": (-1.0, 0.0)}, 0.0)
+        changes.mean_sideslip(-forces["Z"][1])
 
 
 def _imu_place(changes: ColumnChanges, name: str, key: str) -> None:
@@ -278,10 +303,10 @@ def _probe_flow(changes: ColumnChanges, along: int) -> list[tuple[Callable[[Term
         rate = RATES[turning]
         share = sign * changes.per_column(rate) * changes.means.k / changes.airspeed
         if target == 1:
-            found.append((changes.turn_sideslip, rate, share))
+            found.append((changes.by_vane("beta"), rate, share))
             continue
         across, forward = (cos, sin) if target == 2 else (-sin, cos)
-        found.append((changes.turn_flow, rate, across * share))
+        found.append((changes.by_vane("alpha"), rate, across * share))
         found.append((_airspeed_by(changes), rate, forward * share))
     return found
 
@@ -359,4 +384,3 @@ CHANGES: Mapping[str, Change] = {
 _LATE_ONLY = ("air_data_lag.time_constant", "delays.imu")
 #: What is estimated from where the file has it, as no reading can be corrected for it.
 _IN_THE_MODEL = ("air_data_lag", "cg_shift")
-_FLOW = ("vane_scale", "vane_bias", "sensors.air_data", "air_data_lag")

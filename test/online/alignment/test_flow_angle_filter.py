@@ -69,6 +69,25 @@ def test_in_the_band_the_angles_are_the_true_ones(aircraft: Aircraft, most: floa
     assert np.all(error.std(axis=0) < most * true.std(axis=0))
 
 
+def test_a_biased_vertical_accelerometer_is_learnt() -> None:
+    """0.15 m/s^2 holds the angle of attack 0.08 rad off its reference, if the file does not say that it may be biased.
+
+    The roll rate turns such an error into the sideslip.
+    """
+    time, samples = flown(noise=0.0)
+    biased = without(samples)
+    biased[:, 2] += 0.15
+    uncertain = replace(
+        AIRCRAFT, noise_bias={**AIRCRAFT.noise_bias, "accel": 0.15}, stated_tolerances={"noise.bias.accel": 0.15}
+    )
+    exact, off, learnt = (
+        completed(aircraft, time, readings)[-1000:, ALPHA].mean()
+        for aircraft, readings in ((AIRCRAFT, without(samples)), (AIRCRAFT, biased), (uncertain, biased))
+    )
+    assert abs(off - exact) > 0.05
+    assert abs(learnt - exact) < 0.015
+
+
 def test_biased_gyros_are_learnt() -> None:
     """0.3 deg/s for half a minute would be 9 deg of alpha, and more of bank."""
     time, samples = flown()

@@ -1,0 +1,117 @@
+"""Sensitivities to errors of the instruments without vanes, against finite differences of the whole estimator.
+
+The flow angles are then integrals of what the IMU reads, by the filter, in which all of the equations are nonlinear.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plant import fly, made_aircraft, multisteps
+
+from sysid_node.online import estimator
+from sysid_node.online.estimates.published import estimate
+from sysid_node.online.settings import OnlineSettings
+from sysid_node.online.state import EstimatorState
+from sysid_node.online.types import SAMPLE_COLUMNS
+
+RATE, SECONDS = 100.0, 25.4  # Hz; s: one segment
+EXACT = made_aircraft()
+SETTINGS = OnlineSettings(method="sls_rft", detect_changes=False, actuators="positions")
+COLUMN = {name: SAMPLE_COLUMNS.index(name) for name in ("ax", "ay", "az", "p", "q", "r", "V")}
+ANGLES = [SAMPLE_COLUMNS.index(name) for name in ("alpha", "beta")]
+TIME, FLIGHTS = fly(EXACT, multisteps(SECONDS, RATE), RATE, 1, noise=0.0)
+SAMPLES = FLIGHTS[0].copy()
+SAMPLES[:, ANGLES] = np.nan
+
+
+def identified(aircraft, samples) -> EstimatorState:
+    state = estimator.init(aircraft, SETTINGS)
+    for time, sample in zip(TIME.tolist(), samples.tolist(), strict=True):
+        estimator.update(state, time, sample)
+    return state
+
+
+def slopes(state, names) -> np.ndarray:
+    found = estimate(state).derivatives
+    return np.array([found[name].value for name in names])
+
+
+def scaled(name, by):
+    samples = SAMPLES.copy()
+    samples[:, COLUMN[name]] *= 1.0 + by
+    return samples
+
+
+def turned(about, by):
+    """Readings of an IMU that is turned the other way about an axis: the true ones have one axis more of the next."""
+    one, other = (about + 1) % 3, (about + 2) % 3
+    samples = SAMPLES.copy()
+    for first in (COLUMN["ax"], COLUMN["p"]):
+        samples[:, first + one] = SAMPLES[:, first + one] - by * SAMPLES[:, first + other]
+        samples[:, first + other] = SAMPLES[:, first + other] + by * SAMPLES[:, first + one]
+    return samples
+
+
+def shifted(name, by):
+    samples = SAMPLES.copy()
+    samples[:, COLUMN[name]] += by
+    return samples
+
+
+#: What the readings are to be, the derivatives that change most, and how far a sensitivity may be off, as a share.
+CASES = {
+    "imu_scale.q": (lambda by: scaled("q", -by), ("CL_alpha", "CL_q", "Cm_alpha", "Cm_q", "Cm_de"), 0.1),
+    "imu_scale.r": (lambda by: scaled("r", -by), ("CY_beta", "CY_p", "Cl_beta", "Cl_p", "Cn_p", "Cn_dr"), 0.1),
+    "imu_scale.ay": (lambda by: scaled("ay", -by), ("CY_beta", "CY_dr"), 0.1),
+    "imu_bias.ay": (lambda by: shifted("ay", -by), ("CL_q", "CL_de", "Cm_q", "Cm_de"), 0.2),
+    "airspeed_scale.error": (lambda by: scaled("V", -by), ("CL_alpha", "Cm_alpha", "Cm_q", "Cl_beta", "Cn_beta"), 0.25),
+    "imu_misalignment.yaw": (lambda by: turned(2, by), ("CL_q", "CL_de"), 0.25),
+    # the attitude turns as well, but for the part that the references hold
+    "imu_misalignment.roll": (lambda by: turned(0, by), ("CL_q", "CL_de", "Cm_q", "Cm_de", "CY_r"), 0.5),
+}
+
+
+def uncertain(key, step):
+    if key.startswith("imu_bias"):
+        return replace(
+            EXACT, noise_bias={**EXACT.noise_bias, "accel": step}, stated_tolerances={"noise.bias.accel": step}
+        )
+    return replace(EXACT, stated_tolerances={key: step})
+
+
+@pytest.mark.parametrize("key", CASES)
+def test_sensitivities_are_those_of_the_estimator(key):
+    step, (changed, names, share) = 1e-3, CASES[key]
+    state = identified(uncertain(key, step), SAMPLES)
+    assert state.model.imperfections is not None and state.latest is not None and state.latest.systematic is not None
+    assert state.model.imperfections.reconstructed == (True, True)
+    place = state.model.imperfections.keys.index(key)
+    jacobian = state.latest.systematic.considered.jacobian[place].reshape(-1)[state.model.table.place]
+    sensitivity = jacobian[[list(EXACT.derivatives).index(name) for name in names]]
+    behind, ahead = (slopes(identified(EXACT, changed(by)), names) for by in (-step, step))
+    np.testing.assert_allclose(sensitivity, (ahead - behind) / (2.0 * step), rtol=share)
+
+
+def test_errors_of_vanes_are_none_without_vanes():
+    """A file that is unsure of its vanes alone has nothing uncertain in a flight without any."""
+    tolerances = {"vane_scale.alpha": 0.05, "vane_scale.beta": 0.05, "imu_scale.q": 0.01}
+    state = identified(replace(EXACT, stated_tolerances=tolerances), SAMPLES)
+    assert state.model.imperfections is not None
+    assert state.model.imperfections.keys == ("imu_scale.q",)
+
+
+def test_one_vane_leaves_the_other_angle():
+    samples = FLIGHTS[0].copy()
+    samples[:, ANGLES[1]] = np.nan
+    tolerances = {"vane_scale.alpha": 0.05, "vane_scale.beta": 0.05, "imu_scale.q": 0.01, "imu_scale.r": 0.01}
+    state = identified(replace(EXACT, stated_tolerances=tolerances), samples)
+    imperfect = state.model.imperfections
+    assert imperfect is not None and state.latest is not None and state.latest.systematic is not None
+    assert imperfect.reconstructed == (False, True)
+    assert imperfect.keys == ("imu_scale.q", "imu_scale.r", "vane_scale.alpha")
+    changes = state.latest.systematic.known[1]
+    alpha, beta = (changes.columns.place(state.model.layout.column(name)) for name in ("alpha", "beta"))
+    moved = np.abs(changes.signals).sum(axis=2) > 0.0
+    assert moved[:, alpha].tolist() == [False, False, True]
+    assert moved[:, beta].tolist() == [False, True, False]
