@@ -13,7 +13,7 @@ import argparse
 import os
 from pathlib import Path
 
-from bench.estimation.real import attas, cut, hfb320, repeats, thor, twin_otter
+from bench.estimation.real import attas, cut, hfb320, repeats, thor, twin_otter, without_vanes
 from bench.pages import publish
 
 SECTIONS = {
@@ -24,6 +24,7 @@ SECTIONS = {
     "thor_ordinary": thor.ordinary_section,
     "cut": cut.section,
     "repeats": repeats.section,
+    "without_vanes": without_vanes.section,
 }
 
 
