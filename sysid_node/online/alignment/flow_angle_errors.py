@@ -29,11 +29,14 @@ def reconstruction_covariance(
     equations: NormalEquations,
     solution: Solution,
     info: Information,
+    *,
+    mean_bounded: bool,
 ) -> Array:
     """(C, P, P) covariance by which errors of the file reach the unknowns through the reconstructed angles.
 
     An error e of a regressor moves the solution by theta (Z'A)^-1 Z'e. Only the energy of e is known, so its largest
-    possible effect (the Cauchy-Schwarz inequality) is counted. ``at``: time in s.
+    possible effect (the Cauchy-Schwarz inequality) is counted. ``at``: time in s. ``mean_bounded``: whether an error of
+    the mean angle of attack is counted so, too, which else is among the imperfections.
     """
     structure = equations.structure
     covariance = np.zeros((len(structure.coefficients), equations.columns.size, equations.columns.size))
@@ -42,7 +45,7 @@ def reconstruction_covariance(
     gram = info.grams.sum(axis=0)
     outer = gram[equations.instruments[:, None], equations.instruments] * structure.same_block
     reach = solution.inverse @ outer @ solution.inverse.T
-    energies = _error_energies(filter_, at, aircraft, layout, lines, info)
+    energies = _error_energies(filter_, at, aircraft, layout, lines, info, mean_bounded=mean_bounded)
     for name, missing, energy in zip(("alpha", "beta"), filter_.missing, energies, strict=True):
         if missing:
             theta = np.array([regressor == name for regressor in structure.regressors]) @ solution.theta
@@ -51,7 +54,14 @@ def reconstruction_covariance(
 
 
 def _error_energies(
-    filter_: FlowAngleFilter, at: float, aircraft: Aircraft, layout: SignalLayout, lines: Spectrum, info: Information
+    filter_: FlowAngleFilter,
+    at: float,
+    aircraft: Aircraft,
+    layout: SignalLayout,
+    lines: Spectrum,
+    info: Information,
+    *,
+    mean_bounded: bool,
 ) -> list[float]:
     """Energies over the lines of the errors of alpha and beta that the file's errors make.
 
@@ -66,7 +76,7 @@ def _error_energies(
     energies = [
         gain / max(count, 1.0) * float(integrated @ error**2) for gain, error in zip(gains, errors, strict=True)
     ]
-    if "p" in layout.names:
+    if mean_bounded and "p" in layout.names:
         means = info.integrals / max(float(info.integrals[OFFSET]), 1e-9)
         per_rate = 2.0 * aircraft.reference.airspeed / aircraft.geometry.b
         energies[1] += float(means**2 @ errors[0] ** 2) * per_rate**2 * float(integrated[layout.column("p")])

@@ -96,7 +96,15 @@ def _reconstruction_covariance(state: EstimatorState, solution: Solution, total:
     """(C, P, P) covariance that errors of the aircraft file cause through reconstructed flow angles."""
     model = state.model
     return flow_angle_errors.reconstruction_covariance(
-        state.flow, state.transform.last, model.aircraft, model.layout, model.spectrum, state.equations, solution, total
+        state.flow,
+        state.transform.last,
+        model.aircraft,
+        model.layout,
+        model.spectrum,
+        state.equations,
+        solution,
+        total,
+        mean_bounded=model.imperfections is None,
     )
 
 

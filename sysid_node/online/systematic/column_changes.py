@@ -173,6 +173,11 @@ class ColumnChanges:
             changed = {_integral(name, 1): (factor * plain, 0.0) for name, (plain, _) in terms.items()}
             self.by_integration("alpha" if axis == "Z" else "beta")(changed, 0.0)
 
+    def mean_alpha(self, off: float) -> None:
+        """Change a reconstructed sideslip, as the mean angle of attack is ``off`` (rad): v' = ... + p w."""
+        factor = off * self.means.k * self.per_column("p")
+        self.by_integration("beta")({_integral("p", 1): (factor, 0.0)}, 0.0)
+
     def mean_sideslip(self, side_force: float) -> None:
         """Change a reconstructed sideslip, whose mean is that at which the file has the ``side_force`` coefficient.
 

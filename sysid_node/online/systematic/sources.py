@@ -15,12 +15,15 @@ from dataclasses import dataclass
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.stated_effects import sizes_as_uncertainty
+from sysid_node.dynamics.linearised import trimmed
 from sysid_node.online.systematic.column_changes import AXES, FORCES, RATES, ColumnChanges, Terms
 
 Change = Callable[[ColumnChanges, str, str], None]
 
 #: Share of a stated value that its 1 sigma is at least: an exact value must be taken out of the signals, too.
 SMALLEST = 1e-3
+#: Share of a derivative that it may be off by where the file does not say.
+OTHERWISE = 0.2
 
 _MOMENTS = {"Cl": "p", "Cm": "q", "Cn": "r"}
 _COEFFICIENTS = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
@@ -56,10 +59,25 @@ def sources(aircraft: Aircraft, reconstructed: tuple[bool, bool] = (False, False
         seen = _change_of(source) is not None and key not in no_vanes
         if source.sigma > 0.0 and math.isfinite(source.sigma) and seen:
             found.append(source)
+    if reconstructed[0]:
+        found.append(ErrorSource("mean_alpha", _mean_alpha_error(aircraft)))
     bias = aircraft.noise_bias.get("airspeed", 0.0)
     if bias > 0.0 and not (aircraft.ideal and "noise.bias.airspeed" not in aircraft.stated_tolerances):
         found.append(ErrorSource("airspeed_bias", bias))
     return tuple(found)
+
+
+def _mean_alpha_error(aircraft: Aircraft) -> float:
+    """1 sigma (rad) of the mean angle of attack in level flight by the file's lift, whose derivatives are not exact."""
+    alpha, elevator = trimmed(aircraft)
+    means = {"0": 1.0, "alpha": alpha, "V": 1.0, "de": elevator}
+    parts = []
+    for regressor, mean in means.items():
+        derivative = aircraft.derivatives.get(f"CL_{regressor}")
+        if derivative is not None:
+            tolerance = derivative.tolerance
+            parts.append(mean * (OTHERWISE * abs(derivative.value) if tolerance is None else tolerance))
+    return math.hypot(*parts) / abs(aircraft.derivatives["CL_alpha"].value)
 
 
 def _expected(aircraft: Aircraft, key: str, sigma: float) -> ErrorSource:
@@ -193,6 +211,13 @@ def _vane_scale(changes: ColumnChanges, name: str, key: str) -> None:
 
 def _vane_bias(changes: ColumnChanges, name: str, key: str) -> None:
     changes.by_vane(name)({}, -1.0)
+    if name == "alpha":
+        changes.mean_alpha(-1.0)
+
+
+def _mean_alpha(changes: ColumnChanges, name: str, key: str) -> None:
+    changes.by_integration("alpha")({}, 1.0)
+    changes.mean_alpha(1.0)
 
 
 def _air_data_late(changes: ColumnChanges, name: str, key: str) -> None:
@@ -366,6 +391,7 @@ CHANGES: Mapping[str, Change] = {
     "airspeed_bias": _airspeed_bias,
     "vane_scale": _vane_scale,
     "vane_bias": _vane_bias,
+    "mean_alpha": _mean_alpha,
     "delays.air_data": _air_data_late,
     "air_data_lag": _air_data_late,
     "delays.imu": _imu_late,

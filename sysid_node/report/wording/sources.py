@@ -25,6 +25,7 @@ _WORDS = {
     "airspeed_bias": ("the airspeed's zero", "zero the airspeed sensor before the flight"),
     "vane_scale": ("the scale of {}", "calibrate the flow angles in flight"),
     "vane_bias": ("the zero of {}", "calibrate the flow angles in level flight"),
+    "mean_alpha": ("the mean angle of attack, by the file's lift", "measure it with a vane, or CL_0 in level flight"),
     "air_data_lag": ("the air data's lag", "measure the step response of tubes and sensor"),
     "actuator_lag": ("the {} servo's time", "measure it on the bench, or record positions"),
 }

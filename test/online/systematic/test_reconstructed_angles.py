@@ -93,12 +93,32 @@ def test_sensitivities_are_those_of_the_estimator(key):
     np.testing.assert_allclose(sensitivity, (ahead - behind) / (2.0 * step), rtol=share)
 
 
+def test_an_error_of_the_mean_angle_of_attack_is_turned_into_the_sideslip():
+    """The mean is that at which the file has the measured lift: files with other offsets of the lift."""
+    names, step = ("CY_beta", "CY_p", "Cl_p", "Cn_p"), 1e-3
+    state = identified(uncertain("imu_scale.q", 1e-6), SAMPLES)
+    assert state.model.imperfections is not None and state.latest is not None and state.latest.systematic is not None
+    place = state.model.imperfections.keys.index("mean_alpha")
+    jacobian = state.latest.systematic.considered.jacobian[place].reshape(-1)[state.model.table.place]
+    sensitivity = jacobian[[list(EXACT.derivatives).index(name) for name in names]]
+    behind, ahead = (slopes(identified(with_mean_alpha(by), SAMPLES), names) for by in (-step, step))
+    difference = (ahead - behind) / (2.0 * step)
+    np.testing.assert_allclose(sensitivity, difference, rtol=0.1)
+
+
+def with_mean_alpha(by):
+    """A file by which the same lift needs an angle of attack that is larger by so much."""
+    offset, slope = EXACT.derivatives["CL_0"], EXACT.derivatives["CL_alpha"].value
+    changed = replace(offset, value=offset.value - by * slope)
+    return replace(EXACT, derivatives={**EXACT.derivatives, "CL_0": changed})
+
+
 def test_errors_of_vanes_are_none_without_vanes():
     """A file that is unsure of its vanes alone has nothing uncertain in a flight without any."""
     tolerances = {"vane_scale.alpha": 0.05, "vane_scale.beta": 0.05, "imu_scale.q": 0.01}
     state = identified(replace(EXACT, stated_tolerances=tolerances), SAMPLES)
     assert state.model.imperfections is not None
-    assert state.model.imperfections.keys == ("imu_scale.q",)
+    assert state.model.imperfections.keys == ("imu_scale.q", "mean_alpha")
 
 
 def test_one_vane_leaves_the_other_angle():
