@@ -126,18 +126,18 @@ def _median(flights: Sequence[Sequence[float]]) -> list[float]:
     return [float(x) for x in np.median(np.array(flights), axis=0)]
 
 
-def convergence(flights: int) -> str:
+def convergence(numbers: Sequence[int]) -> str:
     """When each derivative is valid for good: median over flights, by manoeuvre and air."""
     columns, heads = [], []
     for name, manoeuvre in MANOEUVRES.items():
         for air in AIRS:
-            pairs = [Pair(number, air) for number in range(1, flights + 1)]
+            pairs = [Pair(number, air) for number in numbers]
             both = [[one.exact(manoeuvre, {}) for one in pairs], [one.ordinary(manoeuvre, {}) for one in pairs]]
             exact, ordinary = (_median([flight.first_valid() for flight in each]) for each in both)
             columns.append([_beside(a, b) for a, b in zip(exact, ordinary, strict=True)])
             counts = [np.array([flight.holding() for flight in each]).sum(axis=0) for each in both]
             columns[-1] += [
-                _beside(*(count[0] / flights for count in counts)),
+                _beside(*(count[0] / len(numbers) for count in counts)),
                 _beside(*(100.0 * count[1] / max(count[0], 1) for count in counts), unit=" %"),
             ]
             heads.append(f"{name}, {air}")
@@ -145,18 +145,18 @@ def convergence(flights: int) -> str:
     return table(("s, positions / commands", *heads), [list(row) for row in zip(names, *columns, strict=True)])
 
 
-def loss(flights: int) -> str:
+def loss(numbers: Sequence[int]) -> str:
     """After half the elevator was lost: when it is announced, and when `Cm_de` is valid and right."""
     rows = []
     for air in AIRS:
-        pairs = [Pair(100 + number, air) for number in range(1, flights + 1)]
+        pairs = [Pair(100 + number, air) for number in numbers]
         for what, fly in (("positions", Pair.exact), ("commands", Pair.ordinary)):
             flown = [fly(pair, OFTEN, LOST) for pair in pairs]
             said = [min((t for t in one.announced() if t >= ONSET), default=math.inf) - ONSET for one in flown]
             early = sum(any(t < ONSET for t in one.announced()) for one in flown)
             right = [_right_again(one) for one in flown]
             valid, wrong = np.array([_at_the_end(one) for one in flown]).sum(axis=0)
-            found = [f"{np.count_nonzero(np.isfinite(x))} of {flights}" for x in (said, right)]
+            found = [f"{np.count_nonzero(np.isfinite(x))} of {len(numbers)}" for x in (said, right)]
             times = ["-" if math.isinf(np.median(x)) else f"{np.median(x):.1f}" for x in (said, right)]
             rows.append([f"{air}: {what}", found[0], times[0], str(early), found[1], times[1], str(valid), str(wrong)])
     heads = (
@@ -189,15 +189,15 @@ def _at_the_end(flight: Flight) -> tuple[bool, bool]:
     return last.valid, last.valid and not last.lower <= 0.5 * flight.truth["Cm_de"] <= last.upper
 
 
-def no_vanes(flights: int) -> str:
+def no_vanes(numbers: Sequence[int]) -> str:
     """What is valid at the end, and holds, without vanes."""
     rows = []
     for air in AIRS[:2]:
         cells = [air]
         for fly in (Pair.exact, Pair.ordinary):
-            flown = [fly(Pair(number, air, vanes=False), MANOEUVRES["3-2-1-1"], {}) for number in range(1, flights + 1)]
+            flown = [fly(Pair(number, air, vanes=False), MANOEUVRES["3-2-1-1"], {}) for number in numbers]
             valid, hold = np.array([one.holding() for one in flown]).sum(axis=0)
-            cells += [f"{valid / flights:.1f}", f"{100 * hold / valid:.0f} %" if valid else "-"]
+            cells += [f"{valid / len(numbers):.1f}", f"{100 * hold / valid:.0f} %" if valid else "-"]
         rows.append(cells)
     return table(("air, no vanes", "positions: valid", "hold", "commands: valid", "hold"), rows)
 
@@ -206,12 +206,13 @@ def main() -> None:
     """Print the tables, or put them in the documentation."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=8, help="in each setting (default: 8)")
+    parser.add_argument("--first", type=int, default=1, help="number of the first (default: 1)")
     parser.add_argument("--only", choices=TABLES, help="one table")
     parser.add_argument("--page", type=Path, help="Markdown file whose sections to fill")
     args = parser.parse_args()
     for name, make in TABLES.items():
         if args.only in (None, name):
-            text = f"{args.flights} flights in each setting.\n\n{make(args.flights)}"
+            text = f"{args.flights} flights in each setting.\n\n{make(range(args.first, args.first + args.flights))}"
             publish(f"bench/estimation/commands_only.py {name}", text, args.page)
 
 
