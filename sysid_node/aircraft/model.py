@@ -75,6 +75,11 @@ class Derivative:
     value: float
     tolerance: float | None = None
 
+    @property
+    def uncertainty(self) -> float:
+        """The tolerance; a fifth of the value where the file states none."""
+        return 0.2 * abs(self.value) if self.tolerance is None else self.tolerance
+
 
 @dataclass(frozen=True)
 class Sensors:

@@ -51,8 +51,13 @@ def coefficients_of(places: Iterable[Place]) -> list[str]:
     return list(dict.fromkeys(coefficient for coefficient, _ in places))
 
 
+def places_of(tables: Sequence[LookupTable]) -> Places:
+    """Coefficient and variables of each table that is left when the tables have been added up."""
+    return tuple(_added_up(tables))
+
+
 def pack(tables: Sequence[LookupTable]) -> tuple[Places, PackedTables]:
-    """The tables, added up, and of which coefficient and over which variables each of the sums is."""
+    """Coefficient and variables of each table that is left when the tables have been added up, and these tables."""
     points, sums = _points(tables), _added_up(tables)
     places, variables = tuple(sums), variables_of(sums)
     longest = max(map(len, points.values()))

@@ -24,7 +24,7 @@ from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.changes.detection import PIECE
 from sysid_node.online.changes.excited_segments import no_excited_segments
 from sysid_node.online.frequency import fourier_transform, regression_signals, sampled_transform
-from sysid_node.online.frequency.regression_signals import NUISANCES, OFFSET, OUTPUTS
+from sysid_node.online.frequency.regression_signals import NUISANCES, OFFSET, OUTPUTS, SignalLayout
 from sysid_node.online.frequency.sampled_transform import SampledTransform
 from sysid_node.online.regression import information, normal_equations
 from sysid_node.online.regression.derivative_index import derivative_index
@@ -43,7 +43,7 @@ from sysid_node.online.state import (
     SegmentTimes,
 )
 from sysid_node.online.status import vocabulary
-from sysid_node.online.systematic.imperfections import imperfections
+from sysid_node.online.systematic.imperfections import Imperfections, imperfections
 from sysid_node.online.systematic.rate_limited_moves import RateLimitedMoves
 from sysid_node.online.systematic.servo_states import ServoStates
 from sysid_node.online.types import SAMPLE_COLUMNS
@@ -119,13 +119,25 @@ def _model(
         times=SegmentTimes(max(segment_time, 4.0 * PIECE), memory),
         prior=believed_derivatives(aircraft, equations.structure),
         instrument_model=instrument_model(aircraft, layout, omega),
-        imperfections=imperfections(
-            aircraft,
-            layout,
-            commanded=commanded,
-            positions=settings.actuators == "positions",
-            command_interval=command_interval,
-        ),
+        imperfections=_imperfections(aircraft, settings, layout, commanded, command_interval),
+    )
+
+
+def _imperfections(
+    aircraft: Aircraft,
+    settings: OnlineSettings,
+    layout: SignalLayout,
+    commanded: bool,
+    command_interval: float,
+    reconstructed: tuple[bool, bool] = (False, False),
+) -> Imperfections | None:
+    return imperfections(
+        aircraft,
+        layout,
+        commanded=commanded,
+        positions=settings.actuators == "positions",
+        command_interval=command_interval,
+        reconstructed=reconstructed,
     )
 
 
@@ -134,13 +146,9 @@ def _tell_reconstructed_angles(state: EstimatorState) -> None:
     model, missing = state.model, state.flow.missing
     if model.imperfections is None or missing is None or model.imperfections.reconstructed == missing:
         return
-    found = imperfections(
-        model.aircraft,
-        model.layout,
-        commanded=model.sample.commanded,
-        positions=model.settings.actuators == "positions",
-        command_interval=model.sample.command_interval,
-        reconstructed=missing,
+    sample = model.sample
+    found = _imperfections(
+        model.aircraft, model.settings, model.layout, sample.commanded, sample.command_interval, missing
     )
     state.model = replace(model, imperfections=found or model.imperfections)
 

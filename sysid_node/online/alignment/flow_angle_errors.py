@@ -17,8 +17,6 @@ from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
-_TOLERANCE = 0.2  # share of a derivative that it may be off by where the file does not say
-
 
 def reconstruction_covariance(
     filter_: FlowAngleFilter,
@@ -89,6 +87,5 @@ def _angle_errors(aircraft: Aircraft, layout: SignalLayout, coefficient: str, an
     for name, derivative in aircraft.derivatives.items():
         of_coefficient, _, regressor = name.partition("_")
         if of_coefficient == coefficient and (regressor == "0" or regressor in layout.names):
-            tolerance = _TOLERANCE * abs(derivative.value) if derivative.tolerance is None else derivative.tolerance
-            error[OFFSET if regressor == "0" else layout.column(regressor)] = tolerance / slope
+            error[OFFSET if regressor == "0" else layout.column(regressor)] = derivative.uncertainty / slope
     return error

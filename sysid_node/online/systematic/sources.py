@@ -22,8 +22,6 @@ Change = Callable[[ColumnChanges, str, str], None]
 
 #: Share of a stated value that its 1 sigma is at least: an exact value must be taken out of the signals, too.
 SMALLEST = 1e-3
-#: Share of a derivative that it may be off by where the file does not say.
-OTHERWISE = 0.2
 
 _MOMENTS = {"Cl": "p", "Cm": "q", "Cn": "r"}
 _COEFFICIENTS = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
@@ -75,8 +73,7 @@ def _mean_alpha_error(aircraft: Aircraft) -> float:
     for regressor, mean in means.items():
         derivative = aircraft.derivatives.get(f"CL_{regressor}")
         if derivative is not None:
-            tolerance = derivative.tolerance
-            parts.append(mean * (OTHERWISE * abs(derivative.value) if tolerance is None else tolerance))
+            parts.append(mean * derivative.uncertainty)
     return math.hypot(*parts) / abs(aircraft.derivatives["CL_alpha"].value)
 
 

@@ -18,7 +18,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import split_derivative
 from sysid_node.dynamics.atmosphere import GRAVITY, dynamic_pressure
 from sysid_node.dynamics.linear_model import level_flight
-from sysid_node.dynamics.packed_tables import PackedTables, Places, pack
+from sysid_node.dynamics.packed_tables import PackedTables, Places, pack, places_of
 from sysid_node.errors import InputError
 
 #: A scalar, or a time series of one: stations and effects work on either.
@@ -35,7 +35,7 @@ class ParameterLayout:
     controls: tuple[str, ...]  # aerodynamic controls: "elevator", ...
     symbols: tuple[str, ...]  # their symbols: "de", ...
     derivatives: tuple[str, ...]  # "CL_0", ...
-    tables: Places = ()  # coefficient and variables of each lookup table, of those that are added up of each sum
+    tables: Places = ()  # coefficient and variables of each lookup table, after tables have been added up
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -79,7 +79,7 @@ _NOISE_OF = ("accel",) * 3 + ("gyro",) * 3 + ("attitude",) * 3 + ("airspeed", "a
 
 def layout_of(aircraft: Aircraft) -> ParameterLayout:
     """The layout of this aircraft."""
-    tables = pack(aircraft.tables)[0] if aircraft.tables else ()
+    tables = places_of(aircraft.tables)
     return ParameterLayout(tuple(aircraft.controls), aircraft.control_symbols, tuple(aircraft.derivatives), tables)
 
 
