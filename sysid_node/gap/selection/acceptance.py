@@ -78,6 +78,7 @@ class AddedSize:
     sample_period: float  # s, of the slowest topic
     largest: float = 0.0  # of its sizes beyond its standard error, in multiples of what real parts show
     bias: float = 0.0  # the largest that was added beyond its standard error, in 1 sigma that the file states, else 0
+    by_clock: float = 0.0  # s, by which the offset of the commands' clock delays the response beside it
 
 
 @dataclass(frozen=True)
@@ -187,15 +188,20 @@ def is_relevant(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -
     """Whether a candidate explains what matters (rules 1 and 3), however probable it is.
 
     What is within one sample, larger than in real parts, or too small to be of interest explains something else than a
-    cause does, and is no alternative to it.
+    cause does, and is no alternative to it. Beside a lag the offset of the commands' clock may explain a sample of the
+    response's delay; the lag itself is the rest. Both together are what a delay of the commands explains alone.
     """
-    return _implausibility(scores, thresholds) is None and _is_large(scores, thresholds.acceptance)
+    return _implausibility(scores, thresholds, together=True) is None and _is_large(scores, thresholds.acceptance)
 
 
-def _implausibility(scores: ComparisonScores, thresholds: Thresholds) -> str | None:
-    """What of rule 1 the candidate fails, in words; none where it passes."""
+def _implausibility(scores: ComparisonScores, thresholds: Thresholds, *, together: bool = False) -> str | None:
+    """What of rule 1 the candidate fails, in words; none where it passes.
+
+    ``together`` counts what the clock's offset explains beside it.
+    """
     added = scores.added
-    if added.time is not None and abs(added.time) < added.sample_period:
+    more = added.by_clock if together else 0.0
+    if added.time is not None and abs(added.time) + more < added.sample_period:
         return "its time is within one sample"
     return "no real part is off so far" if added.largest > thresholds.acceptance.plausible else None
 

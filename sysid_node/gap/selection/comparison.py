@@ -13,7 +13,7 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
-from sysid_node.gap.estimation.candidates import TIME_EFFECTS
+from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, TIME_EFFECTS
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, stated_biases
 from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence, exported_parameters, probabilities
 from sysid_node.gap.estimation.variable_projection import VariableProjection
@@ -38,6 +38,9 @@ from sysid_node.gap.short_flights.readings import READINGS, reading_errors, read
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS
 
+#: The offset of the commands' clock; positive where their stamps are late.
+_COMMANDS_CLOCK = "actuator_stamp_delay.delay"
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -55,7 +58,7 @@ class Comparison:
         """Size of what was added."""
         fitted, models = self.fitted, self.fitted.fit.models
         period = max(max(model.flight.step_interval, 1.0 / model.flight.air_rate) for model in models)
-        return AddedSize(_time(fitted), period, _largest_size(fitted), _largest_bias(fitted))
+        return AddedSize(_time(fitted), period, _largest_size(fitted), _largest_bias(fitted), _by_clock(fitted))
 
     @cached_property
     def probability(self) -> float:
@@ -114,6 +117,18 @@ def _time(fitted: FittedSet) -> float | None:
     entries = list(added.indices)
     changes = fitted.fit.flights[0].point[entries] - fitted.fit.simulator.neutral()[entries]
     return float(changes[np.abs(changes).argmax()])
+
+
+def _by_clock(fitted: FittedSet) -> float:
+    """Time, s, by which the offset of the commands' clock delays the response beside what was added; 0 if it does not.
+
+    The clock is known to one sample. It may take up to a sample of a servo's lag.
+    """
+    added = fitted.added
+    if added is None or added.effect not in RESPONSE_DELAYS:
+        return 0.0
+    place = fitted.fit.simulator.names.index(_COMMANDS_CLOCK)
+    return max(0.0, float(fitted.fit.simulator.neutral()[place] - fitted.fit.flights[0].point[place]))
 
 
 def _largest_size(fitted: FittedSet) -> float:

@@ -178,7 +178,10 @@ def _effects(simulator: Simulator, point: Array) -> dict[str, dict[str, float]]:
 def _separation(
     model: ResidualModel, point: Array, cause: Candidate, alternative: CandidateFit, fit: CandidateFit
 ) -> float:
-    """Distance (sigmas) of a cause's response at parameters (P,) from the nearest by an alternative and nuisances."""
+    """Distance (sigmas) of a cause's response at parameters (P,) from the nearest by an alternative and nuisances.
+
+    Zero where a prediction diverges, so that nothing can be said of the distance.
+    """
     neutral, entries = model.simulator.neutral(), list(cause.entries)
     instead = point.copy()
     instead[entries] = neutral[entries]
@@ -192,5 +195,7 @@ def _separation(
     sigma = np.array([*prior(model.simulator, added)[1], *(known[i] for i in free[len(added) :])])
     matrix = np.vstack([slopes, np.diag(1.0 / sigma)])
     target = np.concatenate([response, np.zeros(sigma.size)])
+    if not (np.isfinite(matrix).all() and np.isfinite(target).all()):
+        return 0.0
     best = np.linalg.lstsq(matrix, target, rcond=None)[0]
     return float(np.linalg.norm(target - matrix @ best))
