@@ -38,9 +38,7 @@ _OF_STRUCTURE = frozenset({"structural_mode"})
 _OF_GROUND = frozenset({"ground_effect"})
 
 #: Parameters that only shape an effect and stay at their defaults: one flight seldom contains information on them.
-_FIXED = frozenset(
-    {"stall_separation.tau1", "stall_separation.tau2", "structural_mode.damping", "actuator_lag.damping"}
-)
+_FIXED = frozenset({"stall_separation.tau1", "structural_mode.damping", "actuator_lag.damping"})
 
 #: Effects with a parameter that all controls share and one for each control. There is a candidate of the shared one,
 #: one of each control alone, and one of every control by itself; of the actuators' lag also one of second order.

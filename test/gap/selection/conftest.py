@@ -38,6 +38,13 @@ def loose(aircraft) -> Fitted:
     return _fitted(aircraft, {"actuator_backlash": {"rudder": 0.08}}, 16, wanted)
 
 
+@pytest.fixture(scope="module")
+def stalling(aircraft) -> Fitted:
+    """As ``late``, with a wing that stalls 8 chords of flight behind the angle of attack."""
+    effect = {"stall_separation": {"depth": 1.0, "alpha_star": 0.17, "tau2": 8.0}}
+    return _fitted(aircraft, effect, 17, ("stall_separation",))
+
+
 def _fitted(aircraft, effects: Mapping[str, Mapping[str, float]], seed: int, wanted: tuple[str, ...]) -> Fitted:
     model = residual_model_of(Simulator(aircraft, 50.0), fly(aircraft, effects, seed=seed))
     nuisances = nuisances_of(aircraft, model)

@@ -17,6 +17,7 @@ from sysid_node.gap.selection.acceptance import (
     ScoresInGusts,
     channels_improved,
     is_accepted,
+    is_relevant,
     nats_by_tolerances,
     rejection,
 )
@@ -134,6 +135,16 @@ def test_each_rule(changes: dict[str, object], reason: str | None) -> None:
     found = rejection(table(**changes))
     assert found is None if reason is None else reason in str(found)
     assert is_accepted(table(**changes)) is (reason is None)
+
+
+@pytest.mark.parametrize(("by_clock", "relevant"), [(0.0, False), (0.004, False), (0.006, True)])
+def test_a_lag_is_an_alternative_by_the_delay_that_it_and_the_clock_make_together(
+    by_clock: float, relevant: bool
+) -> None:
+    """A lag of 5 ms beside a clock that is off by so much, where a sample takes 10 ms: it is never a cause itself."""
+    scores = table(added=added(time=0.005, by_clock=by_clock))
+    assert is_relevant(scores) is relevant
+    assert not is_accepted(scores)
 
 
 @pytest.mark.parametrize(("time", "accepted"), [(0.01 - 1e-9, False), (0.01, True), (0.01 + 1e-9, True)])

@@ -34,6 +34,18 @@ def test_a_set_is_fitted_once_and_ranked_by_its_predictions(late) -> None:
     assert fitter.add_candidate(base, candidates["command_delay"]).fit is best.fit
 
 
+def test_a_stall_is_fitted_with_its_delay_behind_the_angle_of_attack(stalling) -> None:
+    """Within 4 sigma of the fit and a hundredth: the flight is simulated at another rate than it is predicted at."""
+    fitter, base, candidates = stalling
+    fit = fitter.add_candidate(base, candidates["stall_separation"]).fit
+    errors = np.sqrt(np.diag(fit.covariance))
+    names = [fit.simulator.names[i].partition(".")[2] for i in fit.indices]
+    for name, true in {"depth": 1.0, "alpha_star": 0.17, "tau2": 8.0}.items():
+        place = names.index(name)
+        assert abs(fit.values[place] - true) < 4.0 * errors[place] + 0.01 * true
+        assert errors[place] < 0.1 * true
+
+
 def test_a_fit_without_numbers_is_no_explanation(late) -> None:
     """Where slopes grow without end a matrix is not positive definite."""
 

@@ -1,5 +1,7 @@
 """The flight that tells effects apart; truth: a late command and an early stamp are the same thing in any flight."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gap_flights import fly
@@ -34,6 +36,16 @@ def test_a_lag_and_a_delay_are_parted_by_some_flight(fits) -> None:
     best = propose(chosen, [(chosen.candidates[0], fits["actuator_lag"])])
     assert best is not None and best.separation > 3.0
     assert np.isfinite(best.flown)
+
+
+def test_a_flight_in_which_an_alternative_diverges_tells_nothing_apart(fits) -> None:
+    """SVD does not converge on what is not finite."""
+    chosen, alternative = fits["command_delay"], fits["actuator_stamp_delay"]
+    (flight,) = alternative.flights
+    point = np.where(np.isin(np.arange(flight.point.size), alternative.indices), np.nan, flight.point)
+    endless = replace(alternative, flights=(replace(flight, point=point),))
+    best = propose(chosen, [(chosen.candidates[0], endless)])
+    assert best is not None and best.separation == best.flown == 0.0
 
 
 @pytest.mark.parametrize(
