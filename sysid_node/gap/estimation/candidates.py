@@ -147,7 +147,7 @@ def _shapes(
         speed = float(np.max([_fastest(model) for model in models]))
         yield "inverse_rate", tuple(1.0 / (max(speed, 0.1) * share) for share in (0.6, 0.3, 0.15, 0.07))
     if effect == "actuator_backlash":
-        moved = _travel(models)
+        moved = travel_of(models)
         least = float(moved[moved > 0.0].min(initial=0.2))
         yield "width", tuple(_believed(simulator, effect) + share * least for share in _PLAYS)
     if effect in TIME_EFFECTS:
@@ -171,7 +171,7 @@ def _fastest(model: ResidualModel) -> Array:
     return np.asarray(np.abs(np.diff(model.commands[:, :-1], axis=0)).max(axis=0) * model.simulator.rate)
 
 
-def _travel(models: Sequence[ResidualModel]) -> Array:
+def travel_of(models: Sequence[ResidualModel]) -> Array:
     """How far each command (controls,) goes to either side of its middle, rad."""
     return np.asarray(np.max([0.5 * np.ptp(model.commands[:, :-1], axis=0) for model in models], axis=0))
 
@@ -187,7 +187,7 @@ def _variants(simulator: Simulator, models: Sequence[ResidualModel], effect: str
         return []
     indices = tuple(simulator.names.index(f"{effect}.{control}") for control in controls)
     by_speed = {c: 1.0 / max(float(s), 0.1) for c, s in zip(simulator.layout.controls, speeds, strict=True)}
-    travel = dict(zip(simulator.layout.controls, _travel(models), strict=True))
+    travel = dict(zip(simulator.layout.controls, travel_of(models), strict=True))
     starts = [
         [by_speed[c] / share for share in (0.4, 0.1)] if effect == "actuator_rate_limit"
         else [float(travel[c]) * share for share in _PLAYS] if effect == "actuator_backlash"

@@ -3,8 +3,8 @@
 A significant effect is not enough: a delay of a millisecond may be beyond doubt and of no interest. An effect is
 accepted where all of these hold:
 
-1. it is not a time within one sample of the slowest topic, which is a matter of sampling, and not larger than real
-   parts show;
+1. it is not a time within one sample of the slowest topic, which is a matter of sampling, no free play in which the
+   surface does not move at all, and not larger than real parts show;
 2. with it the explanation predicts flight that was not fitted better, beyond doubt; a bias beyond what the file states
    of it, which fitted derivatives can stand in for, need only predict no worse;
 3. it matters by one of these: on some channel of forces, moments and kinematics it removes a share of the remainder,
@@ -78,6 +78,7 @@ class AddedSize:
     sample_period: float  # s, of the slowest topic
     largest: float = 0.0  # of its sizes beyond its standard error, in multiples of what real parts show
     bias: float = 0.0  # the largest that was added beyond its standard error, in 1 sigma that the file states, else 0
+    play: float = 0.0  # least share of a control's travel that a free play takes, where it is one
     by_clock: float = 0.0  # s, by which the offset of the commands' clock delays the response beside it
 
 
@@ -203,6 +204,8 @@ def _implausibility(scores: ComparisonScores, thresholds: Thresholds, *, togethe
     more = added.by_clock if together else 0.0
     if added.time is not None and abs(added.time) + more < added.sample_period:
         return "its time is within one sample"
+    if added.play > thresholds.priors.jammed:
+        return "with so much free play the surface does not move: it is stuck"
     return "no real part is off so far" if added.largest > thresholds.acceptance.plausible else None
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
-from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, TIME_EFFECTS
+from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, TIME_EFFECTS, travel_of
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, stated_biases
 from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence, exported_parameters, probabilities
 from sysid_node.gap.estimation.variable_projection import VariableProjection
@@ -37,6 +37,9 @@ from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.short_flights.readings import READINGS, reading_errors, reading_motion
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS
+from sysid_node.sim.model.parameters import stated_parameters
+
+_FREE_PLAY = "actuator_backlash"
 
 #: The offset of the commands' clock; positive where their stamps are late.
 _COMMANDS_CLOCK = "actuator_stamp_delay.delay"
@@ -58,7 +61,9 @@ class Comparison:
         """Size of what was added."""
         fitted, models = self.fitted, self.fitted.fit.models
         period = max(max(model.flight.step_interval, 1.0 / model.flight.air_rate) for model in models)
-        return AddedSize(_time(fitted), period, _largest_size(fitted), _largest_bias(fitted), _by_clock(fitted))
+        return AddedSize(
+            _time(fitted), period, _largest_size(fitted), _largest_bias(fitted), _play(fitted), _by_clock(fitted)
+        )
 
     @cached_property
     def probability(self) -> float:
@@ -129,6 +134,17 @@ def _by_clock(fitted: FittedSet) -> float:
         return 0.0
     place = fitted.fit.simulator.names.index(_COMMANDS_CLOCK)
     return max(0.0, float(fitted.fit.simulator.neutral()[place] - fitted.fit.flights[0].point[place]))
+
+
+def _play(fitted: FittedSet) -> float:
+    """Share of its control's travel that a free play takes, of several controls the least; zero of another effect."""
+    added = fitted.added
+    if added is None or added.effect != _FREE_PLAY:
+        return 0.0
+    simulator, point = fitted.fit.simulator, fitted.fit.flights[0].point
+    travel = dict(zip(simulator.layout.controls, 2.0 * travel_of(fitted.fit.models), strict=True))
+    widths = {name: each.value(point) for name, each in stated_parameters(simulator.layout, _FREE_PLAY).items()}
+    return min((w / travel[name] for name, w in widths.items() if w > 0.0 and travel.get(name)), default=0.0)
 
 
 def _largest_size(fitted: FittedSet) -> float:

@@ -111,6 +111,8 @@ def table(**changes: object) -> ComparisonTable:
         ({"channels": powers(contribution=np.zeros(12))}, "too little"),
         ({"channels": powers(contribution=channels(0.5, channel=1))}, "too little"),  # not on the one that it improves
         ({"channels": powers(contribution=np.full(12, np.inf))}, None),  # without it nothing finite is predicted
+        ({"added": added(play=0.96)}, "stuck"),
+        ({"added": added(play=0.94)}, None),
         ({"added": added(largest=LIMITS.plausible + 1e-9)}, "so far"),
         ({"added": added(largest=LIMITS.plausible)}, None),
         ({"channels": LITTLE, "shifts": shifted(40.0, 10.0)}, None),  # fifteen nats by the joint prior

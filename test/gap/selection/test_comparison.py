@@ -46,6 +46,14 @@ def test_the_true_effect_is_accepted_by_every_score(lag) -> None:
     assert is_accepted(lag)
 
 
+def test_a_free_play_counts_by_its_share_of_the_travel_of_its_control(loose) -> None:
+    """Truth: the rudder goes 0.12 rad to either side; its free play was 0.08 rad."""
+    fitter, base, candidates = loose
+    alone, other = candidates["actuator_backlash of rudder"], candidates["imu_scale"]
+    assert Comparison(base, base, fitter.add_candidate(base, alone)).added.play == pytest.approx(1.0 / 3.0, rel=0.1)
+    assert Comparison(base, base, fitter.add_candidate(base, other)).added.play == 0.0
+
+
 def test_the_table_decides_as_the_measured_scores_do(lag) -> None:
     table = lag.table()
     assert is_accepted(table)
