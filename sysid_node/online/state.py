@@ -15,7 +15,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.alignment.flow_angle_filter import FlowAngleFilter
 from sysid_node.online.changes.detection import ChangeMonitor
 from sysid_node.online.changes.excited_segments import ExcitedSegments
-from sysid_node.online.frequency import sampled_transform
+from sysid_node.online.frequency import fourier_transform, sampled_transform
 from sysid_node.online.frequency.regression_signals import MomentumGain, ScalarSignals, SignalLayout
 from sysid_node.online.frequency.sampled_transform import SampledTransform
 from sysid_node.online.regression.actuator_lag_test import LagTest
@@ -163,6 +163,7 @@ class PresentSegment:
     """The segment that is under way, of which alone the transform is. Times in s."""
 
     start: float = math.nan  # NaN = none is under way
+    start_impulse: Array = field(default_factory=lambda: np.empty(0))  # (2F + 1,) a unit one at the start
     samples: int = 0
     intervals: float = 0.0  # s: sum of the air data's intervals
     piece_start: float = math.nan  # of the piece under way, half a second of data
@@ -173,6 +174,10 @@ class PresentSegment:
     first_impulses: Array = field(default_factory=lambda: np.empty((0, 0)))  # of the servos, at the segment's start
     first_servos: ServoStates | None = None  # then; None where they are not to be looked at again
     information: Information | None = None  # at the last renewal; None = none since the segment's start
+
+    def start_at(self, time: float, omega: Array) -> None:
+        """Let the segment start at ``time`` (s), with lines ``omega`` (F,) rad/s."""
+        self.start, self.start_impulse = time, fourier_transform.impulse(omega, time)
 
 
 @dataclass
@@ -266,14 +271,18 @@ def completed(steps: Steps[T]) -> T:
             return result
 
 
-def current_lines(state: EstimatorState) -> Array:
-    """(2F + 1, W) the transform of the present segment up to the last sample, with the servos' impulses."""
+def current_lines(state: EstimatorState, impulse: Array | None = None) -> Array:
+    """(2F + 1, W) the transform of the present segment up to the last sample, with the servos' impulses.
+
+    ``impulse`` (2F + 1,): a unit one at the last sample, from a caller that has it already.
+    """
     lines = sampled_transform.current(state.transform)
     servos = state.controls.states
     if servos is not None and state.segment.first_impulses.size:
         model, time = state.model, state.transform.last
         first = state.segment.first_impulses
+        unit = fourier_transform.impulse(model.spectrum.omega, time) if impulse is None else impulse
         if model.spectrum.rate:
             first = first * math.exp(0.5 * model.spectrum.rate * (state.segment.start - time))
-        lines[:, model.layout.rates] += servos.impulses(model.spectrum.omega, time) - first
+        lines[:, model.layout.rates] += servos.impulses(unit) - first
     return lines

@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 BLOCK = 16  # intervals in a block at most
 MOMENTS = 12
 _SPAN = 1.25  # rad, by which the highest line's phase turns in a block at most: 0.625^12 / 12! is 7e-12
+_ONE = np.ones(1)
 _LANES = 8  # vectors are padded to whole SIMD registers: a value's bits then do not depend on its place
 
 
@@ -223,6 +224,12 @@ def _total(state: Transform) -> Array:
 def restart(state: Transform, time: float) -> None:
     """Forget all; the transform goes on at ``time`` (s)."""
     state.done, state.count, state.last = np.zeros_like(state.done), 0, time
+
+
+def impulse(omega: Array, time: float) -> Array:
+    """(2F + 1,) the transform of a unit impulse at ``time`` (s), at lines ``omega`` (F,) rad/s."""
+    wave = np.exp((-1j * time) * omega)
+    return np.concatenate([wave.real, wave.imag, _ONE])
 
 
 def take_out(state: Transform, part: Array) -> None:

@@ -142,12 +142,11 @@ class Edges:
         gram -= across.T.dot(self.inverse.dot(across))
 
 
-def edges(omega: Array, begin: float, end: float) -> Edges:
-    """The impulses at ``begin`` and ``end`` (s) at lines ``omega`` (F,) rad/s."""
-    F = omega.size
+def edges(begin: Array, end: Array) -> Edges:
+    """The edges whose impulses are ``begin`` and ``end`` (2F + 1,), as of ``fourier_transform.impulse``."""
+    F = begin.size // 2
     found = np.empty((2, 2 * F))
-    wave = np.exp(np.multiply.outer((-1j * begin, -1j * end), omega))
-    found[:, :F], found[:, F:] = wave.real, wave.imag
+    found[0], found[1] = begin[:-1], end[:-1]
     overlap = float(found[0].dot(found[1])) / F
     left = 1.0 - overlap * overlap
     if left < ALIKE:
