@@ -86,13 +86,17 @@ class ValidityBasis:
 
     unobjected: NDArray[np.bool_]  # (D,) whether all criteria evaluated at the renewal are met
     objections: Codes  # (D,) status by the criteria evaluated at the renewal, 0 = ok
+    reasons: Codes  # (D,) what is said of those that are not valid, unless a sample says more
+    open: NDArray[np.bool_]  # (D,) whether a sample may say more: where nothing is objected
     squares: Array  # (D,) of half of Student's interval over a standard error
     longest: Array  # (D,) the largest squared standard error of an interval that has an end
     allowed: Array  # (D,) the largest squared standard error of a valid estimate
     relative: Array | None  # (D,) ... as a share of the estimate's square, where that may be larger
     systematic: Array  # (D,) squared systematic errors
+    systematic_errors: Array  # (D,) their roots
+    systematic_arms: Array  # (D,) squares of what they alone make of an interval's half
     floor: Array  # (P,) energy under which a regressor is buried in noise
-    fits: Array  # (C, 3) what ``FitQuality`` says besides R squared
+    fits: Array  # (C, 4) what ``FitQuality`` says, behind room for R squared
     servos: Codes  # (m,) what is said against every derivative of a control whose servo is estimated, 0 = not of every
 
 

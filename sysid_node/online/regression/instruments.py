@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,11 @@ class InstrumentModel:
     servos: NDArray[np.complex128] | None = None
     #: (2, 2, F, 2 m) what real and imaginary parts of the rates' lines bring to those of controls and rates.
     following: Array = field(default_factory=lambda: np.zeros((2, 2, 0, 0)))
+
+    @cached_property
+    def rates_twice(self) -> NDArray[np.intp]:
+        """(2m,) columns of the rates, and again."""
+        return np.tile(np.arange(self.rates.start, self.rates.stop), 2)
 
 
 def instrument_model(aircraft: Aircraft, layout: SignalLayout, omega: Array) -> InstrumentModel | None:
@@ -83,8 +89,7 @@ def fill_in(model: InstrumentModel, lines: Array) -> None:
 def _follow(model: InstrumentModel, lines: Array, F: int) -> None:
     """Move controls and their rates by the servos' lateness: X + g R, and R + j omega g R, of the rates' lines R."""
     parts = lines.reshape(*lines.shape[:-2], 2, F, lines.shape[-1])
-    rates = parts[..., model.rates]
-    both = np.concatenate([rates, rates], axis=-1)
+    both = lines.take(model.rates_twice, axis=-1).reshape(*parts.shape[:-1], -1)
     more = model.following * both[..., None, :, :, :]
     parts[..., model.controls.start : model.rates.stop] += more[..., 0, :, :] + more[..., 1, :, :]
 

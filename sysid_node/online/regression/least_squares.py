@@ -182,6 +182,6 @@ def most_correlated(equations: NormalEquations, solution: Solution) -> Index:
     spread = np.sqrt(np.abs(solution.inverse.diagonal()))
     # each row's own spread is common to all of it
     correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)
-    correlation *= structure.same_block - structure.unit
+    correlation *= structure.others
     rival: Index = correlation.argmax(axis=-1)
     return rival
