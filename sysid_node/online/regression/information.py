@@ -168,7 +168,11 @@ def about_mean(transform: Array, model: InstrumentModel | None, edges: Edges | N
     else:
         share = transform[-1] / max(float(transform[-1, OFFSET]), 1e-12)
         share[_NUISANCES] = 0.0
-        dger(-1.0, share, transform[:, OFFSET], a=transform.T, overwrite_a=True)  # z - k share
+        k = transform[:, OFFSET]
+        if transform.flags.f_contiguous:
+            dger(-1.0, k, share, a=transform, overwrite_a=True)  # z - k share
+        else:
+            dger(-1.0, share, k, a=transform.T, overwrite_a=True)
     lines = transform[..., :-1, :]
     if model is not None:
         fill_in(model, lines)
@@ -249,7 +253,7 @@ def products(transform: Array, model: InstrumentModel | None, edges: Edges | Non
     The transform is overwritten.
     """
     lines = about_mean(transform, model)
-    gram: Array = lines.T.dot(lines)
+    gram: Array = lines.T @ lines
     if edges is not None:
         edges.take_out_of(gram, lines)
     _project_out(gram)
