@@ -288,5 +288,6 @@ def current_lines(state: EstimatorState, impulse: Array | None = None) -> Array:
         unit = fourier_transform.impulse(model.spectrum.omega, time) if impulse is None else impulse
         if model.spectrum.rate:
             first = first * math.exp(0.5 * model.spectrum.rate * (state.segment.start - time))
-        lines[:, model.layout.rates] += servos.impulses(unit) - first
+        rates = lines[:, model.layout.rates]
+        rates += servos.impulses(unit) - first
     return lines

@@ -142,9 +142,7 @@ def judge(state: EstimatorState, latest: SegmentSolution, current: CurrentSoluti
     if np.count_nonzero(poor):
         good &= ~poor.take(table.coefficient)
     bad = ~good
-    codes = bad.astype(np.uint8)
-    if np.count_nonzero(bad):
-        codes *= _reasons(state, basis, current, bad, inflation, buried, poor)
+    codes: Codes = bad * _reasons(state, basis, current, bad, inflation, buried, poor)
     if current.time - state.changes.changed_at < SETTLING:
         codes[:] = status.CHANGED
     if now - current.time > STALE:
@@ -189,8 +187,12 @@ def _reasons(
 
     ``inflation`` (P,) of its unknown's variance, a regressor ``buried`` (P,) in noise, a ``poor`` (C,) fit.
     """
-    table, asked, reasons = state.model.table, bad & basis.open, basis.reasons.copy()
-    slopes = asked & table.slope
+    if not current.solution.usable:
+        return np.full_like(basis.reasons, status.NOT_EXCITED)
+    table, asked = state.model.table, bad & basis.open
+    if not np.count_nonzero(asked):
+        return basis.reasons
+    reasons, slopes = basis.reasons.copy(), asked & table.slope
     # what is found later counts more
     if np.count_nonzero(poor):
         reasons[poor.take(table.coefficient) & asked] = status.OUTSIDE
@@ -200,6 +202,4 @@ def _reasons(
         reasons[collinear] = state.model.vocabulary.collinear + rivals[collinear]
     if np.count_nonzero(buried):
         reasons[buried.take(table.unknown) & slopes] = status.NOT_EXCITED
-    if not current.solution.usable:
-        reasons[:] = status.NOT_EXCITED
     return reasons

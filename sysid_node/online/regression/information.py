@@ -158,9 +158,9 @@ def edges(begin: Array, end: Array) -> Edges:
 def about_mean(transform: Array, model: InstrumentModel | None, edges: Edges | None = None) -> Array:
     """(..., 2F, W) lines of transforms (..., 2F + 1, W) whose signals are taken about their means, and of instruments.
 
-    The lines are made where the transforms lie, which must be in one piece. Nuisances are kept, but for what they have
-    in common with the ``edges`` which are taken out of all. The airspeed's noise is in k: fitting
-    the offset to the lines of k would regress on noise.
+    The lines are made where the transforms lie, which must be in one piece, signal by signal or line by line. Nuisances
+    are kept, but for what they have in common with the ``edges`` which are taken out of all. The airspeed's noise is in
+    k: fitting the offset to the lines of k would regress on noise.
     """
     if transform.ndim > 2:
         for one in transform:
@@ -169,7 +169,7 @@ def about_mean(transform: Array, model: InstrumentModel | None, edges: Edges | N
         share = transform[-1] / max(float(transform[-1, OFFSET]), 1e-12)
         share[_NUISANCES] = 0.0
         k = transform[:, OFFSET]
-        if transform.flags.f_contiguous:
+        if transform.flags.f_contiguous:  # signal by signal
             dger(-1.0, k, share, a=transform, overwrite_a=True)  # z - k share
         else:
             dger(-1.0, share, k, a=transform.T, overwrite_a=True)

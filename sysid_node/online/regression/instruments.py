@@ -86,7 +86,8 @@ def _follow(model: InstrumentModel, lines: Array, F: int) -> None:
     rates = signals[..., model.rates, :]
     more = model.following * rates.reshape(*rates.shape[:-2], 1, -1, 1, 2, F)
     moved = more[..., 0, :] + more[..., 1, :]
-    signals[..., model.controls.start : model.rates.stop, :] += moved.reshape(*rates.shape[:-2], -1, 2 * F)
+    both = signals[..., model.controls.start : model.rates.stop, :]
+    both += moved.reshape(both.shape)
 
 
 def _linear(aircraft: Aircraft, layout: SignalLayout) -> tuple[Array, Array, NDArray[np.intp], Array]:

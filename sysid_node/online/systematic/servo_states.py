@@ -77,4 +77,4 @@ class ServoStates:
             return np.zeros((unit.size, len(self.lateness)))
         pairs = zip(self.positions, self.controls, strict=True)
         behind = [self.scale * (position - control) for position, control in pairs]
-        return np.asarray(np.multiply.outer(behind, unit).T)
+        return (np.array(behind)[:, None] * unit).T
