@@ -15,7 +15,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.online.alignment.flow_angle_filter import FlowAngleFilter
 from sysid_node.online.changes.detection import ChangeMonitor
 from sysid_node.online.changes.excited_segments import ExcitedSegments
-from sysid_node.online.frequency import sampled_transform
+from sysid_node.online.frequency import fourier_transform, sampled_transform
 from sysid_node.online.frequency.regression_signals import MomentumGain, ScalarSignals, SignalLayout
 from sysid_node.online.frequency.sampled_transform import SampledTransform
 from sysid_node.online.regression.actuator_lag_test import LagTest
@@ -86,13 +86,17 @@ class ValidityBasis:
 
     unobjected: NDArray[np.bool_]  # (D,) whether all criteria evaluated at the renewal are met
     objections: Codes  # (D,) status by the criteria evaluated at the renewal, 0 = ok
+    reasons: Codes  # (D,) what is said of those that are not valid, unless a sample says more
+    open: NDArray[np.bool_]  # (D,) whether a sample may say more: where nothing is objected
     squares: Array  # (D,) of half of Student's interval over a standard error
     longest: Array  # (D,) the largest squared standard error of an interval that has an end
     allowed: Array  # (D,) the largest squared standard error of a valid estimate
     relative: Array | None  # (D,) ... as a share of the estimate's square, where that may be larger
     systematic: Array  # (D,) squared systematic errors
+    systematic_errors: Array  # (D,) their roots
+    systematic_arms: Array  # (D,) squares of what they alone make of an interval's half
     floor: Array  # (P,) energy under which a regressor is buried in noise
-    fits: Array  # (C, 3) what ``FitQuality`` says besides R squared
+    fits: Array  # (C, 4) what ``FitQuality`` says, behind room for R squared
     servos: Codes  # (m,) what is said against every derivative of a control whose servo is estimated, 0 = not of every
 
 
@@ -163,6 +167,7 @@ class PresentSegment:
     """The segment that is under way, of which alone the transform is. Times in s."""
 
     start: float = math.nan  # NaN = none is under way
+    start_impulse: Array = field(default_factory=lambda: np.empty(0))  # (2F + 1,) a unit one at the start
     samples: int = 0
     intervals: float = 0.0  # s: sum of the air data's intervals
     piece_start: float = math.nan  # of the piece under way, half a second of data
@@ -173,6 +178,10 @@ class PresentSegment:
     first_impulses: Array = field(default_factory=lambda: np.empty((0, 0)))  # of the servos, at the segment's start
     first_servos: ServoStates | None = None  # then; None where they are not to be looked at again
     information: Information | None = None  # at the last renewal; None = none since the segment's start
+
+    def start_at(self, time: float, omega: Array) -> None:
+        """Let the segment start at ``time`` (s), with lines ``omega`` (F,) rad/s."""
+        self.start, self.start_impulse = time, fourier_transform.impulse(omega, time)
 
 
 @dataclass
@@ -266,14 +275,19 @@ def completed(steps: Steps[T]) -> T:
             return result
 
 
-def current_lines(state: EstimatorState) -> Array:
-    """(2F + 1, W) the transform of the present segment up to the last sample, with the servos' impulses."""
+def current_lines(state: EstimatorState, impulse: Array | None = None) -> Array:
+    """(2F + 1, W) the transform of the present segment up to the last sample, with the servos' impulses.
+
+    ``impulse`` (2F + 1,): a unit one at the last sample, from a caller that has it already.
+    """
     lines = sampled_transform.current(state.transform)
     servos = state.controls.states
     if servos is not None and state.segment.first_impulses.size:
         model, time = state.model, state.transform.last
         first = state.segment.first_impulses
+        unit = fourier_transform.impulse(model.spectrum.omega, time) if impulse is None else impulse
         if model.spectrum.rate:
             first = first * math.exp(0.5 * model.spectrum.rate * (state.segment.start - time))
-        lines[:, model.layout.rates] += servos.impulses(model.spectrum.omega, time) - first
+        rates = lines[:, model.layout.rates]
+        rates += servos.impulses(unit) - first
     return lines

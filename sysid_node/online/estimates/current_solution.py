@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.online.frequency import fourier_transform
 from sysid_node.online.frequency.regression_signals import OFFSET
 from sysid_node.online.regression import least_squares
 from sysid_node.online.regression.information import edges, products
@@ -35,9 +36,12 @@ def current_solution(state: EstimatorState) -> CurrentSolution | None:
     latest, equations = state.latest, state.equations
     if latest is None:
         return None
-    lines, time = current_lines(state), state.transform.last
+    time, impulses = state.transform.last, None
+    impulse = fourier_transform.impulse(state.model.spectrum.omega, time)
+    if state.controls.servos:
+        impulses = edges(state.segment.start_impulse, impulse)
+    lines = current_lines(state, impulse)
     integrals = latest.finished.integrals + lines[-1]
-    impulses = edges(state.model.spectrum.omega, state.segment.start, time) if state.controls.servos else None
     gram = products(lines, state.controls.line_model, impulses)
     gram += latest.finished.gram
     growth, noise = growth_since(latest, time), latest.later.compensation

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sysid_node.online import status
 from sysid_node.online.estimates.current_solution import CurrentSolution, current_solution
 from sysid_node.online.estimates.rows import DerivativeRows, FitRows
-from sysid_node.online.estimates.validity import judge, validity_basis
+from sysid_node.online.estimates.validity import NORMAL_95, judge, validity_basis
 from sysid_node.online.frequency import regression_signals
 from sysid_node.online.regression import weak_instruments
 from sysid_node.online.state import EstimatorState, PublishedImperfections, SegmentSolution
@@ -20,7 +20,6 @@ from sysid_node.online.types import DerivativeEstimate, Estimates
 
 Array = NDArray[np.float64]
 
-NORMAL_95 = 1.959963984540054  # standard errors of the normal distribution's two-sided 95 % interval
 AHEAD = "ahead of its command"  # status of a servo that no surface can have
 SERVO_KNOWN = 0.01  # s: the largest standard error of a servo's time that is valid
 
@@ -87,21 +86,18 @@ def _intervals(state: EstimatorState, latest: SegmentSolution, current: CurrentS
     values, variances, basis = current.values, current.variances, validity_basis(state, latest)
     below, above = weak_instruments.interval_arms(basis.squares * variances, latest.instruments.anderson_rubin)
     statistical = np.sqrt(variances)
-    if latest.systematic is None:
-        return np.stack([values, statistical, statistical, basis.systematic, values - below, values + above], axis=-1)
-    systematic = basis.systematic
-    arms = NORMAL_95**2 * systematic
-    below, above = np.sqrt(below * below + arms), np.sqrt(above * above + arms)
-    errors = np.sqrt(variances + systematic), statistical, np.sqrt(systematic)
-    return np.stack([values, *errors, values - below, values + above], axis=-1)
+    errors = statistical
+    if latest.systematic is not None:
+        errors, arms = np.sqrt(variances + basis.systematic), basis.systematic_arms
+        below, above = np.sqrt(below * below + arms), np.sqrt(above * above + arms)
+    return np.array([values, errors, statistical, basis.systematic_errors, values - below, values + above]).T
 
 
 def _fits(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution) -> Array:
     """(C, 4) numbers of the fits, see ``rows``."""
-    solution = current.solution
-    fits = np.empty((solution.motion.size, 4))
+    solution, fits = current.solution, validity_basis(state, latest).fits.copy()
     explained = 1.0 - solution.residual / np.maximum(solution.motion, 1e-300)
-    fits[:, 0], fits[:, 1:] = np.minimum(np.maximum(explained, 0.0), 1.0), validity_basis(state, latest).fits
+    np.minimum(np.maximum(explained, 0.0), 1.0, out=fits[:, 0])
     return fits
 
 

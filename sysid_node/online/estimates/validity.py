@@ -20,6 +20,7 @@ from sysid_node.online.status import Codes
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+NORMAL_95 = 1.959963984540054  # standard errors of the normal distribution's two-sided 95 % interval
 ENOUGH_FREEDOM = 5.0  # degrees of freedom under which an interval is not trusted
 INDISTINGUISHABLE = 1e4  # variance inflation beyond which regressors cannot be told apart at all
 COLLINEAR = 10.0  # ... beyond which collinearity is named as the reason for a wide interval
@@ -49,18 +50,23 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
     cautions = np.where(table.offset, factors.max(axis=0)[c], factors[table.unknown, c])
     caution, longest = np.maximum(cautions, 1.0), latest.instruments.anderson_rubin.longest(squares)
     systematic = _systematic(state, latest)
+    unobjected = objections == status.OK
     stds, samples = np.sqrt(2.0 * (stop - start) * latest.uncertainty.density), round(latest.total.samples)
     return ValidityBasis(
-        unobjected=(strength >= normal_equations.STRONG)[c] & (objections == status.OK),
+        unobjected=(strength >= normal_equations.STRONG)[c] & unobjected,
         objections=objections,
+        reasons=np.where(unobjected, np.uint8(status.CONVERGING), objections),
+        open=unobjected,
         squares=squares,
         longest=longest,
         # what is allowed is counted with the systematic part, which no caution about chance concerns
         allowed=np.minimum((table.allowed**2 - systematic) / caution, longest),
         relative=table.relative**2 / caution if table.relative.any() else None,
         systematic=systematic,
+        systematic_errors=np.sqrt(systematic),
+        systematic_arms=NORMAL_95**2 * systematic,
         floor=np.maximum(BURIED * latest.total.bias.take(equations.entries.energy), least_squares.TINY),
-        fits=np.stack([stds, freedom, np.full_like(stds, samples)], axis=1),
+        fits=np.stack([np.zeros_like(stds), stds, freedom, np.full_like(stds, samples)], axis=1),
         servos=_of_servos(state, objections),
     )
 
@@ -132,12 +138,11 @@ def judge(state: EstimatorState, latest: SegmentSolution, current: CurrentSoluti
     poor = _poor(current)
     good = _narrow(basis, current) & basis.unobjected
     if np.count_nonzero(hidden):
-        good &= ~(hidden.take(table.unknown) & ~table.offset) & ~_with_hidden_slope(state, hidden)
+        good &= ~(hidden.take(table.unknown) & table.slope) & ~_with_hidden_slope(state, hidden)
     if np.count_nonzero(poor):
         good &= ~poor.take(table.coefficient)
-    codes = np.zeros(good.shape, np.uint8)
-    if np.count_nonzero(good) < good.size:
-        np.copyto(codes, _reasons(state, basis, current, inflation, buried, poor), where=~good)
+    bad = ~good
+    codes: Codes = bad * _reasons(state, basis, current, bad, inflation, buried, poor)
     if current.time - state.changes.changed_at < SETTLING:
         codes[:] = status.CHANGED
     if now - current.time > STALE:
@@ -173,23 +178,28 @@ def _reasons(
     state: EstimatorState,
     basis: ValidityBasis,
     current: CurrentSolution,
+    bad: Flags,
     inflation: Array,
     buried: Flags,
     poor: Flags,
 ) -> Codes:
-    """(D,) what speaks against each.
+    """(D,) what speaks against those that are ``bad`` (D,).
 
     ``inflation`` (P,) of its unknown's variance, a regressor ``buried`` (P,) in noise, a ``poor`` (C,) fit.
     """
-    table, slope = state.model.table, ~state.model.table.offset
+    if not current.solution.usable:
+        return np.full_like(basis.reasons, status.NOT_EXCITED)
+    table, asked = state.model.table, bad & basis.open
+    if not np.count_nonzero(asked):
+        return basis.reasons
+    reasons, slopes = basis.reasons.copy(), asked & table.slope
     # what is found later counts more
-    reasons = np.where(poor.take(table.coefficient), np.uint8(status.OUTSIDE), np.uint8(status.CONVERGING))
-    collinear = (inflation.take(table.unknown) > COLLINEAR) & slope
-    if collinear.any():
+    if np.count_nonzero(poor):
+        reasons[poor.take(table.coefficient) & asked] = status.OUTSIDE
+    collinear = (inflation.take(table.unknown) > COLLINEAR) & slopes
+    if np.count_nonzero(collinear):
         rivals = least_squares.most_correlated(state.equations, current.solution).take(table.unknown)
         reasons[collinear] = state.model.vocabulary.collinear + rivals[collinear]
-    reasons[buried.take(table.unknown) & slope] = status.NOT_EXCITED
-    np.copyto(reasons, basis.objections, where=basis.objections != status.OK)
-    if not current.solution.usable:
-        reasons[:] = status.NOT_EXCITED
+    if np.count_nonzero(buried):
+        reasons[buried.take(table.unknown) & slopes] = status.NOT_EXCITED
     return reasons

@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 BLOCK = 16  # intervals in a block at most
 MOMENTS = 12
 _SPAN = 1.25  # rad, by which the highest line's phase turns in a block at most: 0.625^12 / 12! is 7e-12
+_ONE = np.ones(1)
 _LANES = 8  # vectors are padded to whole SIMD registers: a value's bits then do not depend on its place
 
 
@@ -144,7 +145,7 @@ class Transform:
 
 def start(grid: Lines, width: int, memory: float = math.inf, room: int = 0) -> Transform:
     """An empty transform of ``width`` signals, with ``room`` for further columns, which stay zero."""
-    done, values = np.zeros((grid.rows, width + room)), np.zeros((BLOCK, 2, width + room))
+    done, values = np.zeros((width + room, grid.rows)).T, np.zeros((BLOCK, 2, width + room))
     kernels, waves = np.zeros((BLOCK, 2, MOMENTS)), np.zeros((MOMENTS, grid.rows))
     powers = np.tile(_AT_BEGIN, (BLOCK + 1, 1))
     return Transform(grid, width, memory, done, kernels, values, waves, powers)
@@ -213,9 +214,9 @@ def _growth(memory: float, time: float) -> float:
 
 
 def _total(state: Transform) -> Array:
-    """(R, width + room) the finished blocks and the unfinished one's part."""
-    moments = state.kernels.reshape(-1, MOMENTS).T.dot(state.values.reshape(-1, state.values.shape[-1]))
-    total: Array = state.waves.T.dot(moments)
+    """(R, width + room) the finished blocks and the unfinished one's part; each signal's rows lie in one piece."""
+    moments = state.values.reshape(-1, state.values.shape[-1]).T.dot(state.kernels.reshape(-1, MOMENTS))
+    total: Array = moments.dot(state.waves).T
     total += state.done
     return total
 
@@ -223,6 +224,12 @@ def _total(state: Transform) -> Array:
 def restart(state: Transform, time: float) -> None:
     """Forget all; the transform goes on at ``time`` (s)."""
     state.done, state.count, state.last = np.zeros_like(state.done), 0, time
+
+
+def impulse(omega: Array, time: float) -> Array:
+    """(2F + 1,) the transform of a unit impulse at ``time`` (s), at lines ``omega`` (F,) rad/s."""
+    wave = np.exp((-1j * time) * omega)
+    return np.concatenate([wave.real, wave.imag, _ONE])
 
 
 def take_out(state: Transform, part: Array) -> None:
@@ -239,7 +246,7 @@ def at_rest(state: Transform) -> Transform:
 def current(state: Transform) -> Array:
     """(R, width + room) the transform up to the last sample: real parts, imaginary parts, integrals."""
     if not state.count:
-        return state.done.copy()
+        return state.done.copy(order="K")
     total = _total(state)
     if math.isfinite(state.memory):
         total *= _growth(state.memory, state.begin - state.last)

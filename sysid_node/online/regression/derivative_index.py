@@ -29,6 +29,11 @@ class DerivativeIndex:
     unformed: tuple[str, ...]  # derivatives whose equation cannot be formed
 
     @cached_property
+    def slope(self) -> NDArray[np.bool_]:
+        """(D,) whether it is no C_0."""
+        return ~self.offset
+
+    @cached_property
     def all_names(self) -> tuple[str, ...]:
         """Of the D derivatives, and behind them of those whose equation cannot be formed."""
         return self.names + self.unformed

@@ -142,12 +142,11 @@ class Edges:
         gram -= across.T.dot(self.inverse.dot(across))
 
 
-def edges(omega: Array, begin: float, end: float) -> Edges:
-    """The impulses at ``begin`` and ``end`` (s) at lines ``omega`` (F,) rad/s."""
-    F = omega.size
+def edges(begin: Array, end: Array) -> Edges:
+    """The edges whose impulses are ``begin`` and ``end`` (2F + 1,), as of ``fourier_transform.impulse``."""
+    F = begin.size // 2
     found = np.empty((2, 2 * F))
-    wave = np.exp(np.multiply.outer((-1j * begin, -1j * end), omega))
-    found[:, :F], found[:, F:] = wave.real, wave.imag
+    found[0], found[1] = begin[:-1], end[:-1]
     overlap = float(found[0].dot(found[1])) / F
     left = 1.0 - overlap * overlap
     if left < ALIKE:
@@ -159,9 +158,9 @@ def edges(omega: Array, begin: float, end: float) -> Edges:
 def about_mean(transform: Array, model: InstrumentModel | None, edges: Edges | None = None) -> Array:
     """(..., 2F, W) lines of transforms (..., 2F + 1, W) whose signals are taken about their means, and of instruments.
 
-    The lines are made where the transforms lie, which must be in one piece. Nuisances are kept, but for what they have
-    in common with the ``edges`` which are taken out of all. The airspeed's noise is in k: fitting
-    the offset to the lines of k would regress on noise.
+    The lines are made where the transforms lie, which must be in one piece, signal by signal or line by line. Nuisances
+    are kept, but for what they have in common with the ``edges`` which are taken out of all. The airspeed's noise is in
+    k: fitting the offset to the lines of k would regress on noise.
     """
     if transform.ndim > 2:
         for one in transform:
@@ -169,7 +168,11 @@ def about_mean(transform: Array, model: InstrumentModel | None, edges: Edges | N
     else:
         share = transform[-1] / max(float(transform[-1, OFFSET]), 1e-12)
         share[_NUISANCES] = 0.0
-        dger(-1.0, share, transform[:, OFFSET], a=transform.T, overwrite_a=True)  # z - k share
+        k = transform[:, OFFSET]
+        if transform.flags.f_contiguous:  # signal by signal
+            dger(-1.0, k, share, a=transform, overwrite_a=True)  # z - k share
+        else:
+            dger(-1.0, share, k, a=transform.T, overwrite_a=True)
     lines = transform[..., :-1, :]
     if model is not None:
         fill_in(model, lines)
@@ -250,7 +253,7 @@ def products(transform: Array, model: InstrumentModel | None, edges: Edges | Non
     The transform is overwritten.
     """
     lines = about_mean(transform, model)
-    gram: Array = lines.T.dot(lines)
+    gram: Array = lines.T @ lines
     if edges is not None:
         edges.take_out_of(gram, lines)
     _project_out(gram)

@@ -37,8 +37,8 @@ class InstrumentModel:
     rates: slice = field(default_factory=lambda: slice(0, 0))  # columns of their rates, right behind them
     #: (F, m) ``servo_model.lateness``: what the rates bring to the controls' lines; None where controls are exact.
     servos: NDArray[np.complex128] | None = None
-    #: (2, 2, F, 2 m) what real and imaginary parts of the rates' lines bring to those of controls and rates.
-    following: Array = field(default_factory=lambda: np.zeros((2, 2, 0, 0)))
+    #: (2, m, 2, 2, F) to controls and rates: what their real and imaginary parts get of those of the rates' lines.
+    following: Array = field(default_factory=lambda: np.zeros((2, 0, 2, 2, 0)))
 
 
 def instrument_model(aircraft: Aircraft, layout: SignalLayout, omega: Array) -> InstrumentModel | None:
@@ -57,8 +57,8 @@ def with_servos(
     """The model with the controls' response to what is recorded of them, ``servos`` (F, m)."""
     none = np.zeros((omega.size, 0, len(layout.timed)), dtype=complex)
     model = model or InstrumentModel(none, layout.deflections, layout.rates)
-    both = np.hstack([servos, 1j * omega[:, None] * servos])
-    following = np.array([[both.real, -both.imag], [both.imag, both.real]])
+    both = np.array([servos.T, (1j * omega[:, None] * servos).T])  # (2, m, F)
+    following = np.stack([np.stack([both.real, -both.imag], -2), np.stack([both.imag, both.real], -2)], -3)
     return replace(model, servos=servos, following=following)
 
 
@@ -82,11 +82,12 @@ def fill_in(model: InstrumentModel, lines: Array) -> None:
 
 def _follow(model: InstrumentModel, lines: Array, F: int) -> None:
     """Move controls and their rates by the servos' lateness: X + g R, and R + j omega g R, of the rates' lines R."""
-    parts = lines.reshape(*lines.shape[:-2], 2, F, lines.shape[-1])
-    rates = parts[..., model.rates]
-    both = np.concatenate([rates, rates], axis=-1)
-    more = model.following * both[..., None, :, :, :]
-    parts[..., model.controls.start : model.rates.stop] += more[..., 0, :, :] + more[..., 1, :, :]
+    signals = lines.swapaxes(-1, -2)
+    rates = signals[..., model.rates, :]
+    more = model.following * rates.reshape(*rates.shape[:-2], 1, -1, 1, 2, F)
+    moved = more[..., 0, :] + more[..., 1, :]
+    both = signals[..., model.controls.start : model.rates.stop, :]
+    both += moved.reshape(both.shape)
 
 
 def _linear(aircraft: Aircraft, layout: SignalLayout) -> tuple[Array, Array, NDArray[np.intp], Array]:

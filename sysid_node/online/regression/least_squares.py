@@ -46,7 +46,7 @@ def solve(equations: NormalEquations, gram: Array, bias: Array | None = None) ->
     P, flat = equations.columns.size, gram.reshape(-1)
     gathered = flat.take(equations.entries.normal)
     gathered *= equations.entries.counted
-    normal, cross = gathered
+    normal, cross = gathered[0], gathered[1]
     if bias is not None:
         cross -= bias
     solved, usable = _factorised(equations, cross)
@@ -182,6 +182,6 @@ def most_correlated(equations: NormalEquations, solution: Solution) -> Index:
     spread = np.sqrt(np.abs(solution.inverse.diagonal()))
     # each row's own spread is common to all of it
     correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)
-    correlation *= structure.same_block - structure.unit
+    correlation *= structure.others.T  # it is symmetric, and lies as LAPACK's inverse does
     rival: Index = correlation.argmax(axis=-1)
     return rival

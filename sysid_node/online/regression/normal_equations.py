@@ -32,6 +32,7 @@ class ModelStructure:
     same_block: Array  # (P, P) 1 where two unknowns belong to one block
     belongs: Array  # (P, C) 1 where the unknown belongs to the coefficient
     unit: Array  # (P, P) the unit matrix
+    others: Array  # (P, P) 1 where two different unknowns belong to one block
 
     def unknowns(self, coefficient: int) -> Index:
         """Indices of a coefficient's unknowns."""
@@ -44,14 +45,16 @@ def model_structure(regressors: dict[str, tuple[str, ...]]) -> ModelStructure:
     blocks = list(dict.fromkeys(slopes.values()))
     group = np.array([i for i, block in enumerate(blocks) for _ in block], dtype=np.intp)
     block = np.array([blocks.index(rs) for rs in slopes.values()], dtype=np.intp)
+    same_block, unit = (group[:, None] == group).astype(float), np.eye(group.size)
     return ModelStructure(
         coefficients=tuple(slopes),
         regressors=tuple(r for block in blocks for r in block),
         group=group,
         block=block,
-        same_block=(group[:, None] == group).astype(float),
+        same_block=same_block,
         belongs=(group[:, None] == block).astype(float),
-        unit=np.eye(group.size),
+        unit=unit,
+        others=same_block - unit,
     )
 
 

@@ -86,12 +86,13 @@ def interval_arms(squares: Array, bounds: AndersonRubinBounds) -> tuple[Array, A
     h = squares * bounds.counted
     left = 1.0 - h * bounds.curve
     endless = left < ROUNDING
-    if endless.any():
+    some = np.count_nonzero(endless)
+    if some:
         left[endless] = 1.0
     h /= left
     middle = (0.5 * bounds.slope) * h
     half = np.sqrt(middle * middle + h)
     below, above = half - middle, half + middle
-    if endless.any():
+    if some:
         below[endless] = above[endless] = np.inf
     return below, above

@@ -73,7 +73,8 @@ def _begin_anew(state: EstimatorState, lines: Array, since: float) -> Steps[None
     segment.noise_moments = segment.noise_moments * share
     state.finished.information = no_information(state)
     state.finished.in_window.clear()
-    segment.start, segment.first_servos = since, None  # what was before is taken out with the servos as they were
+    segment.start_at(since, state.model.spectrum.omega)
+    segment.first_servos = None  # what was before is taken out with the servos as they were
     sampled_transform.take_out(state.transform, before)
     state.changes.monitor = ChangeMonitor()
     yield from solve_with_servos(state, current_lines(state))

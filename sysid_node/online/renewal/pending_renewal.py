@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from sysid_node.online.frequency import sampled_transform
+from sysid_node.online.frequency.fourier_transform import impulse
 from sysid_node.online.renewal.segment_information import fading
 from sysid_node.online.state import EstimatorState, PendingRenewal, Steps, completed, current_lines
 
@@ -63,7 +64,7 @@ def _take_over(state: EstimatorState, pending: PendingRenewal) -> None:
         _take_over_segment(state, pending, moved)
     elif moved and found is not None:
         state.segment.first_servos = found.copy()
-        state.segment.first_impulses = found.impulses(state.model.spectrum.omega, pending.time)
+        state.segment.first_impulses = found.impulses(impulse(state.model.spectrum.omega, pending.time))
     if moved and states is not None and found is not None:
         for sample in states.recent:
             if sample[0] > pending.time:
@@ -84,7 +85,8 @@ def _take_over_segment(state: EstimatorState, pending: PendingRenewal, moved: bo
     if began_anew:
         before = pending.lines - sampled_transform.current(pending.copy.transform)
         sampled_transform.take_out(state.transform, before * fading(state, pending.time))
-        segment.start, segment.noise_moments = renewed.start, renewed.noise_moments
+        segment.start, segment.start_impulse = renewed.start, renewed.start_impulse
+        segment.noise_moments = renewed.noise_moments
         segment.samples += renewed.samples - pending.samples
         segment.intervals += renewed.intervals - pending.intervals
     segment.information = renewed.information

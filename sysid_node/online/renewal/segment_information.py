@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.online.frequency.fourier_transform import impulse
 from sysid_node.online.regression import heteroskedasticity, information, regressor_noise
 from sysid_node.online.regression.information import Information
 from sysid_node.online.state import EstimatorState
@@ -57,7 +58,7 @@ def information_of(state: EstimatorState, lines: Array, begin: float, end: float
     if model.imperfections is None:
         clean = information.clean_lines(lines, state.controls.line_model)
         return information.measure_clean(clean, lines[-1], model.spectrum, begin, end)
-    edges = information.edges(model.spectrum.omega, begin, end)
+    edges = information.edges(*(impulse(model.spectrum.omega, time) for time in (begin, end)))
     clean = information.clean_lines_and_rates(
         lines, state.controls.line_model, edges, model.spectrum.omega, layout.differentiated
     )

@@ -16,6 +16,7 @@ from sysid_node.online.changes import detection
 from sysid_node.online.changes.detection import PIECE, ChangeDecision, ChangeMonitor
 from sysid_node.online.changes.excited_segments import remember
 from sysid_node.online.frequency import sampled_transform
+from sysid_node.online.frequency.fourier_transform import impulse
 from sysid_node.online.regression.heteroskedasticity import NoiseMoments
 from sysid_node.online.regression.information import edges, products
 from sysid_node.online.renewal import pending_renewal, servo_search
@@ -88,9 +89,8 @@ def _count_segment_in(state: EstimatorState, lines: Array) -> None:
     """Let estimates hold the segment that ends here until its last renewal is done."""
     latest, model = state.latest, state.model
     if latest is not None:
-        impulses = (
-            edges(model.spectrum.omega, state.segment.start, state.transform.last) if state.controls.servos else None
-        )
+        end = impulse(model.spectrum.omega, state.transform.last)
+        impulses = edges(state.segment.start_impulse, end) if state.controls.servos else None
         gram = latest.finished.gram + products(lines.copy(), state.controls.line_model, impulses)
         latest.finished = FinishedSums(gram, latest.finished.integrals + lines[-1])
 
@@ -99,10 +99,11 @@ def begin_segment(state: EstimatorState) -> None:
     """Begin a segment, of which alone the transform is, and a piece of the change monitor at the last sample."""
     time, segment = state.transform.last, state.segment
     sampled_transform.restart(state.transform)
+    segment.start_at(time, state.model.spectrum.omega)
     if state.controls.states is not None:
         segment.first_servos = state.controls.states.copy()
-        segment.first_impulses = segment.first_servos.impulses(state.model.spectrum.omega, time)
-    segment.start, segment.samples, segment.intervals = time, 0, 0.0
+        segment.first_impulses = segment.first_servos.impulses(segment.start_impulse)
+    segment.samples, segment.intervals = 0, 0.0
     segment.noise_moments, segment.noise_measured_until = NoiseMoments(), time
     _begin_piece(state)
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.online.frequency.fourier_transform import impulse
 from sysid_node.online.renewal.segment_information import measure_segment
 from sysid_node.online.renewal.segment_solution import last_errors, solve_all
 from sysid_node.online.state import (
@@ -81,7 +82,7 @@ def move_servos(state: EstimatorState, servos: ServoModel) -> Steps[None]:
     first = state.segment.first_servos
     if first is not None:
         state.segment.first_servos = first.moved(servos.lateness.tolist())
-        state.segment.first_impulses = state.segment.first_servos.impulses(model.spectrum.omega, first.time)
+        state.segment.first_impulses = state.segment.first_servos.impulses(impulse(model.spectrum.omega, first.time))
     finished, found = state.finished, {}
     kept = [info for _, info in finished.in_window]
     kept += [segment.information for excited in state.changes.excited for segment in excited.segments]

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.online.frequency.fourier_transform import impulse
 from sysid_node.online.regression.information import clean_lines_and_rates, edges
 from sysid_node.online.regression.instruments import InstrumentModel
 from sysid_node.online.regression.least_squares import misfits
@@ -83,7 +84,8 @@ class LineCorrection:
     ) -> Complex:
         """(F, N) clean lines of all signals that corrections are made of (``ServoColumns``)."""
         layout, columns, F = self.changes.layout, self.changes.columns, omega.size
-        clean = clean_lines_and_rates(transform, model, edges(omega, *ends), omega, layout.differentiated)
+        impulses = edges(*(impulse(omega, end) for end in ends))
+        clean = clean_lines_and_rates(transform, model, impulses, omega, layout.differentiated)
         clean = np.delete(clean, np.s_[layout.transformed : layout.width], axis=1)
         lines = np.zeros((F, columns.width), dtype=complex)
         lines[:, : columns.transformed] = clean[:F] + 1j * clean[F:]

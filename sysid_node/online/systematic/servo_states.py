@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_ONE = np.ones(1)
 LONGEST = 0.5  # s
 REMEMBERED = 1.0  # s: after which it no longer matters where a servo was; several times the latest servos' lateness
 SHORTEST = 1e-3  # s: a lateness under which a servo is where it is told to be
@@ -72,11 +71,10 @@ class ServoStates:
                 self.positions[i] += (1.0 - decay) * excess[i]
         self.controls = controls
 
-    def impulses(self, omega: Array, time: float) -> Array:
-        """(2F + 1, m) what k (p - x) of the servos at ``time`` (s) is in the transform."""
+    def impulses(self, unit: Array) -> Array:
+        """(R, m) what k (p - x) of the servos is in the transform, by that of a ``unit`` impulse (R,) at this time."""
         if not self.controls:
-            return np.zeros((2 * omega.size + 1, len(self.lateness)))
+            return np.zeros((unit.size, len(self.lateness)))
         pairs = zip(self.positions, self.controls, strict=True)
         behind = [self.scale * (position - control) for position, control in pairs]
-        wave = np.exp((-1j * time) * omega)
-        return np.asarray(np.multiply.outer(np.concatenate([wave.real, wave.imag, _ONE]), behind))
+        return (np.array(behind)[:, None] * unit).T

@@ -88,6 +88,13 @@ def test_increments_are_the_transform_of_the_derivative_with_its_boundary_terms(
     np.testing.assert_allclose(complexes(fourier_transform.current(slopes)), 1j * w * X + ends, rtol=0, atol=3e-8)
 
 
+def test_an_impulse_is_what_a_short_pulse_of_unit_area_is() -> None:
+    """But for (omega h)^2 / 12 of it, with a triangle that rises and falls within h = 0.1 ms each."""
+    time = np.array([7.0 - 1e-4, 7.0, 7.0 + 1e-4])
+    pulse = fourier_transform.current(fed(GRID, time, np.array([[0.0], [1e4], [0.0]])))[:, 0]
+    np.testing.assert_allclose(fourier_transform.impulse(GRID.omega, 7.0), pulse, rtol=0, atol=2e-7)
+
+
 def test_jitter_and_lost_samples_do_not_bias() -> None:
     """A sine of 0.5 Hz: what is left is the straight lines' error, (omega h)^2 / 12; sums at nominal times fail."""
     errors, naive = [], []

@@ -90,6 +90,17 @@ def test_a_late_drift_is_taken_out_as_well_as_an_early_one() -> None:
         assert np.abs(clean[:, REGRESSOR]).max() < 1e-5
 
 
+def test_lines_about_the_mean_do_not_depend_on_how_transforms_lie() -> None:
+    time, signals = record(5)
+    lines = transformed(time, signals)
+    laid = [np.array(lines, order=order) for order in ("C", "F")]
+    by_line, by_signal = (information.about_mean(transform, None) for transform in laid)
+    np.testing.assert_allclose(by_line, by_signal, rtol=1e-12, atol=1e-12)
+    share = lines[-1] / lines[-1, OFFSET]
+    share[OFFSET : OFFSET + 3] = 0.0
+    np.testing.assert_allclose(by_signal, lines[:-1] - lines[:-1, [OFFSET]] * share, rtol=1e-12, atol=1e-12)
+
+
 def test_projection_keeps_the_nuisances_and_is_orthogonal_to_them() -> None:
     time, signals = record(4)
     lines = information.about_mean(transformed(time, signals), None)

@@ -5,16 +5,23 @@ Truth: the same renewals made at once.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.flight.bag.reader import read_streams
 from sysid_node.online import estimator
+from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.estimates.published import estimate
+from sysid_node.online.frequency.fourier_transform import impulse
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.state import EstimatorState
 from test.online.plant import fly, made_aircraft, multisteps
 
+BAGS = Path(__file__).resolve().parents[3] / "bags"
 RATE = 50.0
 AIRCRAFT = made_aircraft(stated_tolerances={"actuator_lag.elevator": 0.05, "geometry.S": 0.005})
 Array = NDArray[np.float64]
@@ -72,3 +79,18 @@ def test_estimates_hold_every_sample_while_a_segment_is_being_finished(flown) ->
             largest = max(largest, abs(row.value - before) / row.standard_error)
         before, start = row.value, state.segment.start
     assert ends and largest < 0.2
+
+
+def test_the_impulse_at_the_start_is_of_the_segment_under_way() -> None:
+    """Segments end here, and one begins later than it did, as the elevator is found to have lost half its effect."""
+    aircraft, settings = load_aircraft("cdrw"), OnlineSettings()
+    aligned = align_streams(aircraft, read_streams(BAGS / "cdrw_failed_elevator"), settings.max_gap)
+    state, starts = estimator.init(aircraft, settings), [np.nan]
+    for moment, sample in zip(aligned.time.tolist(), aligned.samples.tolist(), strict=True):
+        estimator.update(state, moment, sample)
+        if state.segment.start not in starts and np.isfinite(state.segment.start):
+            starts.append(state.segment.start)
+            expected = impulse(state.model.spectrum.omega, state.segment.start)
+            np.testing.assert_array_equal(state.segment.start_impulse, expected)
+    assert np.isfinite(state.changes.changed_at)
+    assert np.diff(starts[1:]).min() < 0.9 * state.model.times.length
