@@ -89,7 +89,7 @@ def test_a_corrected_file_is_exported_with_its_effects(tmp_path, capsys, form):
         (["kestrel", "--format", "gazebo", "--model", "{run}/own.yaml"], "not XML"),
         (["kestrel", "--format", "rosflight", "--model", "{run}/own.yaml"], "not parameters of rosflight_sim"),
         (["{run}/broken.json", "--format", "gazebo"], "not the summary.json of a run"),
-        (["cdrw", "--format", "jsbsim", "--out", "{run}/none/model.xml"], "cannot be written"),
+        (["cdrw", "--format", "jsbsim", "--out", "{run}/summary.json/model.xml"], "cannot be written"),
         (["{run}", "--format", "jsbsim", "--out", "{run}/summary.json"], "holds something else; give --force"),
         (["{run}/own.yaml", "--format", "jsbsim", "--out", "{run}/own.yaml", "--force"], "is the input"),
     ],

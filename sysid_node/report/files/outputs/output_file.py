@@ -31,20 +31,22 @@ def check_file(path: Path, inputs: Iterable[str | Path], mark: str, *, force: bo
         if path.is_dir():
             raise InputError(f"--out {path}: is a folder; choose another file")
         earlier = path.exists() and mark in path.read_bytes()[:4000].decode("utf-8", "replace")
-        allowed = path.parent.is_dir() and os.access(path.parent, os.W_OK)
+        there = next(folder for folder in path.absolute().parents if folder.exists())
+        allowed = there.is_dir() and os.access(there, os.W_OK)
     except OSError as error:
         raise _not_writable(path, error) from error
     if not allowed:
-        raise InputError(f"--out {path}: cannot be written: {path.parent} is no folder to write in; choose another")
+        raise InputError(f"--out {path}: cannot be written: {there} is no folder to write in; choose another")
     if path.exists() and not (earlier or force):
         raise InputError(f"--out {path}: exists and holds something else; give --force to replace it, or another file")
 
 
 def write_file(path: Path, text: str) -> None:
-    """Write a text aside and move it into place. Raises InputError where that cannot be done."""
+    """Write a text aside and move it into place; folders that lack are made. Raises InputError where this fails."""
     aside = _aside(path)
     try:
         with indivisible():
+            path.parent.mkdir(parents=True, exist_ok=True)
             aside.write_text(text, encoding="utf-8")
             aside.replace(path)
     except OSError as error:

@@ -38,12 +38,20 @@ def test_the_input_is_never_the_output(tmp_path, force):
         check_file(tmp_path / "link.yaml", [tmp_path / "a.yaml"], MARK, force=force)
 
 
-@pytest.mark.parametrize("path", ["missing/model.xml", "folder", "file/model.xml", "x" * 300])
+@pytest.mark.parametrize("path", ["folder", "file/model.xml", "file/within/model.xml", "x" * 300])
 def test_a_file_that_cannot_be_written_is_refused(tmp_path, path):
     (tmp_path / "folder").mkdir()
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="--out"):
         check_file(tmp_path / path, [], MARK, force=True)
+
+
+def test_folders_that_lack_are_made(tmp_path):
+    path = tmp_path / "models" / "plane" / "model.xml"
+    check_file(path, [], MARK, force=False)
+    assert not any(tmp_path.iterdir())  # before there is something to write
+    write_file(path, "new")
+    assert path.read_text() == "new"
 
 
 def test_a_bag_appears_whole_with_its_truth(tmp_path):
