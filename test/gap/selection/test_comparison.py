@@ -46,6 +46,16 @@ def test_the_true_effect_is_accepted_by_every_score(lag) -> None:
     assert is_accepted(lag)
 
 
+@pytest.mark.parametrize(("offset", "counted"), [(-0.008, 0.008), (0.008, 0.0)])
+def test_early_stamps_of_the_commands_delay_the_response_beside_a_lag(lag, offset: float, counted: float) -> None:
+    """Late stamps do the opposite."""
+    fitted, clock = lag.fitted, lag.fitted.fit.simulator.names.index("actuator_stamp_delay.delay")
+    (flight,) = fitted.fit.flights
+    point = np.where(np.arange(flight.point.size) == clock, offset, flight.point)
+    moved = replace(fitted, fit=replace(fitted.fit, flights=(replace(flight, point=point),)))
+    assert Comparison(lag.base, lag.without, moved).added.by_clock == pytest.approx(counted)
+
+
 def test_a_free_play_counts_by_its_share_of_the_travel_of_its_control(loose) -> None:
     """Truth: the rudder goes 0.12 rad to either side; its free play was 0.08 rad."""
     fitter, base, candidates = loose
