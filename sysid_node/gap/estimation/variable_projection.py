@@ -60,7 +60,7 @@ class VariableProjection:
         self.indices = list(fit.indices)
         self._set_priors()
         self._kept = (b"", np.empty((0, 0)))
-        self.replaces_nuisances = False  # whether a candidate that was added is or replaces some of them
+        self.replaced = np.zeros(self.now.size, bool)  # nuisances that a candidate that was added is or replaces
         self._set_free(np.ones(self.now.size, bool), np.zeros(self.now.size))
         self._bind(fit.values)
 
@@ -105,10 +105,10 @@ class VariableProjection:
 
         A nuisance parameter at its limit stays there while the values move alone, and may hold what belongs to them:
         an actuator's bias then moves by a thousandth a round, where the joint step finds it at once. The joint step
-        decides anew which nuisance parameters stand at their limits. Values at which predictions diverge are returned,
-        and those of a problem with a candidate that replaces nuisance parameters, which would move again.
+        decides anew which nuisance parameters stand at their limits; those that a candidate replaces are none any more.
+        Values at which predictions diverge are returned.
         """
-        if self.free.all() or self.replaces_nuisances:
+        if (self.free | self.replaced).all():
             return values
         columns, rows = self._columns(values), self._rows(values) + self.shifted_rows
         cross, corner = self.matrix.T @ columns, columns.T @ columns + np.diag(self.sigma**-2.0)
@@ -118,11 +118,14 @@ class VariableProjection:
             return values
         before, deviance = (self.free, self.shift), self.deviance(values)
         limit, now = self.limit / self.spread, self.now / self.spread
-        lower, upper = np.append(-limit - now, low - values), np.append(limit - now, high - values)
+        gone, away = self.replaced, self.shift / self.spread
+        lower = np.append(np.where(gone, away, -limit - now), low - values)
+        upper = np.append(np.where(gone, away, limit - now), high - values)
         step = bounded_least_squares(gram, right, lower, upper)
         moved = now + step[: now.size]
-        beyond = np.abs(moved) > limit * (1.0 - _AT_LIMIT)
-        self._set_free(~beyond, np.where(beyond, np.sign(moved) * self.limit - self.now, 0.0))
+        beyond = ~gone & (np.abs(moved) > limit * (1.0 - _AT_LIMIT))
+        shift = np.where(beyond, np.sign(moved) * self.limit - self.now, np.where(gone, self.shift, 0.0))
+        self._set_free(~beyond & ~gone, shift)
         stepped_values = values + step[now.size :]
         if self.deviance(stepped_values) < deviance:
             return stepped_values
@@ -136,7 +139,8 @@ class VariableProjection:
         step[free] = cho_solve(cho_factor(gram[np.ix_(free, free)]), (right - gram[:, ~free] @ step[~free])[free])
         moved = self.now + self.spread * step[: self.now.size]
         pull = np.sign(moved) * (right - gram @ step)[: self.now.size]
-        return bool((pull[~self.free] >= 0.0).all() and (np.abs(moved) <= self.limit * (1.0 + _AT_LIMIT)).all())
+        there = (pull >= 0.0) | self.free | self.replaced
+        return bool(there.all() and ((np.abs(moved) <= self.limit * (1.0 + _AT_LIMIT)) | self.replaced).all())
 
     def with_candidate(self, candidate: Candidate) -> VariableProjection:
         """The same problem with one candidate more, without the nuisance parameters that it is or replaces.
@@ -157,7 +161,7 @@ class VariableProjection:
             places = nuisances.places(number)
             gone[places] |= fitted | ~np.isin(nuisances.indices, kept)
             neutral[places] |= ~fitted
-        other.replaces_nuisances = bool(gone.any())
+        other.replaced = self.replaced | gone
         if gone.any():
             other._set_free(self.free & ~gone, np.where(gone, -self.now * neutral, self.shift))
         return other
