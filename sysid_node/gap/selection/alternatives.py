@@ -7,17 +7,18 @@ The first effect was chosen before the others were known. Another may take its p
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, TIME_EFFECTS, Candidate
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor_of_alternatives
+from sysid_node.gap.selection.acceptance import is_accepted
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison
 from sysid_node.gap.selection.fitted_set import FittedSet
-from sysid_node.gap.selection.replacement import are_alike, are_as_stated, next_step
+from sysid_node.gap.selection.replacement import Step, are_alike, are_as_stated, next_step
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim.model.parameters import stated_parameters
 
@@ -49,12 +50,20 @@ def replace_stepwise(
     pool = [*{candidate.label: candidate for candidate in fitted}.values(), *untried]
     for _ in range(THRESHOLDS.search.sweeps):
         positions = _positions(fitter, base, chosen, stages[0], pool, untried)
-        step = next_step([_Position(base, chosen, each) for each in positions], barred)
+        scores = [_Position(fitter, base, chosen, each) for each in positions]
+        step = next_step(scores, barred)
         if step is None:
             return chosen, positions
-        position = positions[step.position]
-        chosen = position.without if step.alternative is None else position.alternatives[step.alternative]
+        chosen = _after(scores[step.position], step)
     return chosen, _positions(fitter, base, chosen, stages[0], pool, untried)
+
+
+def _after(position: _Position, step: Step) -> FittedSet:
+    """The explanation after a step at a position."""
+    if step.alternative is None:
+        return position.measured.without
+    alternative = position.alternatives[step.alternative]
+    return alternative.both if step.beside and alternative.both is not None else alternative.fitted
 
 
 def _positions(
@@ -113,6 +122,7 @@ def _is_close(candidate: Candidate, cause: Candidate) -> bool:
 class _Position:
     """Scores of a cause's position, measured when they are read: ``replacement.PositionScores``."""
 
+    fitter: CandidateFitter
     base: FittedSet
     chosen: FittedSet
     measured: CauseAlternatives
@@ -151,6 +161,22 @@ class _Alternative:
         if added is None or added.effect != cause.effect or cause.effect not in SHARED:
             return 0
         return len(cause.indices) - len(added.indices)
+
+    @cached_property
+    def both(self) -> FittedSet | None:
+        """The explanation with the alternative beside the cause; none where the fit gives no numbers."""
+        cause, added = self.position.measured.candidate, self.fitted.added
+        if added is None or added.effect == cause.effect:
+            return None
+        return self.position.fitter.add_candidate(self.position.chosen, added)
+
+    @property
+    def adds_up(self) -> bool:
+        base, chosen, both = self.position.base, self.position.chosen, self.both
+        if both is None or not is_accepted(Comparison(base, chosen, both)):
+            return False
+        cause_added = replace(both, added=self.position.measured.candidate)
+        return is_accepted(Comparison(base, self.fitted, cause_added))
 
     @property
     def enough(self) -> bool:

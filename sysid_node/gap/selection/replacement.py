@@ -8,7 +8,7 @@ measures the table, and fits what the step asks for.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import copysign, inf
 from typing import Protocol
 
@@ -37,6 +37,10 @@ class AlternativeScores(Protocol):
     @property
     def fewer(self) -> int:
         """Parameters that it has fewer than the cause, where both are variants of one effect; else 0."""
+
+    @property
+    def adds_up(self) -> bool:
+        """Whether the cause is accepted beside the alternative, and the alternative beside the cause."""
 
     @property
     def enough(self) -> bool:
@@ -68,6 +72,7 @@ class AlternativeTable:
     lead: float
     fewer: int = 0
     enough: bool = False
+    adds_up: bool = False
 
 
 @dataclass(frozen=True)
@@ -81,10 +86,14 @@ class PositionTable:
 
 @dataclass(frozen=True)
 class Step:
-    """The next explanation: that without the cause at ``position``, or with one of its alternatives in its place."""
+    """The next explanation: that without the cause at ``position``, or with one of its alternatives in its place.
+
+    ``beside``: with the alternative beside the cause.
+    """
 
     position: int
     alternative: int | None = None
+    beside: bool = False
 
 
 def next_step(
@@ -99,8 +108,10 @@ def next_step(
     (all controls alike, one, each by itself) the one with fewer parameters takes the place unless the other leads by
     the penalty of its parameters, and in any case where it can have the other's sizes within what these are known to:
     predictions are so precise that a difference of a hundredth, which is the simulator's own error, would decide
-    otherwise.
+    otherwise. An alternative beside which the cause is still needed is none: both stand, or, where there is no room for
+    one more, the cause alone.
     """
+    room = len(positions) < len(thresholds.search.stages)
 
     def lead(alternative: AlternativeScores) -> float:
         if alternative.fewer and alternative.enough:
@@ -118,8 +129,13 @@ def next_step(
         for k, alternative in enumerate(position.alternatives)
         if alternative.label not in barred and is_accepted(alternative.comparison, thresholds)
     ]
-    best = max(accepted, key=lambda pair: lead(pair[0]), default=None)
-    return best[1] if best is not None and lead(best[0]) > thresholds.search.lead else None
+    better = (pair for pair in accepted if lead(pair[0]) > thresholds.search.lead)
+    for alternative, step in sorted(better, key=lambda pair: -lead(pair[0])):
+        if not alternative.adds_up:
+            return step
+        if room:
+            return replace(step, beside=True)
+    return None
 
 
 def are_alike(sizes: Sequence[float], thresholds: Thresholds = THRESHOLDS) -> bool:
