@@ -39,6 +39,13 @@ def loose(aircraft) -> Fitted:
 
 
 @pytest.fixture(scope="module")
+def late_and_scaled(aircraft) -> Fitted:
+    """As ``late``, with a pitch gyroscope that reads 20 % too much besides."""
+    effects = {"command_delay": {"delay": 0.1}, "imu_scale": {"q": 0.2}}
+    return _fitted(aircraft, effects, 19, ("command_delay", "imu_scale"))
+
+
+@pytest.fixture(scope="module")
 def stalling(aircraft) -> Fitted:
     """As ``late``, with a wing that stalls 8 chords of flight behind the angle of attack."""
     effect = {"stall_separation": {"depth": 1.0, "alpha_star": 0.17, "tau2": 8.0}}

@@ -39,6 +39,16 @@ def test_the_true_effect_stays(late, alone) -> None:
     assert chosen is alone["command_delay"]
 
 
+@pytest.mark.parametrize("first", ["command_delay", "imu_scale"])
+def test_of_two_effects_that_were_flown_neither_takes_the_others_place(late_and_scaled, first) -> None:
+    fitter, base, candidates = late_and_scaled
+    fitted = {label: fitter.add_candidate(base, candidate) for label, candidate in candidates.items()}
+    chosen, _ = replace_stepwise(fitter, base, fitted[first], [list(fitted.values())], [])
+    labels = {candidate.label for candidate in chosen.fit.candidates}
+    better = max(fitted, key=lambda label: fitted[label].evidence.total)
+    assert labels == ({first} if first == better else {"command_delay", "imu_scale"})
+
+
 @pytest.mark.parametrize("first", ["actuator_lag", "command_delay"])
 def test_servos_of_second_order_are_told_from_a_lag_and_from_a_delay(oscillating, first) -> None:
     fitter, base, candidates = oscillating

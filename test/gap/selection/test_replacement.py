@@ -83,6 +83,15 @@ def test_an_alternative_that_is_not_accepted_takes_no_place() -> None:
     assert next_step([cause(alternative("cg_shift", 100.0, accepted=False))]) is None
 
 
+def test_effects_that_add_up_stand_beside_each_other() -> None:
+    """Up to the three causes that an explanation may have; where it has them, the next alternative is asked."""
+    both = replace(alternative("cg_shift", 7.0), adds_up=True)
+    positions = [cause(both, alternative("mass_error", 5.0)), cause()]
+    assert next_step(positions) == Step(0, 0, beside=True)
+    assert next_step([*positions, cause()]) == Step(0, 1)
+    assert next_step([cause(both), cause(), cause()]) is None
+
+
 def test_a_larger_lead_may_be_asked_for() -> None:
     strict = replace(THRESHOLDS, search=replace(THRESHOLDS.search, lead=10.0))
     positions = [cause(alternative("cg_shift", 5.0))]

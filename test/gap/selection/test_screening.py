@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gap_flights import fly
 
 from sysid_node.gap.estimation.candidate_fit import unfitted
 from sysid_node.gap.estimation.candidates import Candidate, candidates_of
@@ -72,6 +73,21 @@ def test_another_mass_is_seen_although_derivatives_have_gone_to_their_limits(air
     (mass,) = (c for c in candidates_of(model.simulator, [model]) if c.label == "mass_error")
     found = screened(fit, problem, mass)
     assert found.start[0] == pytest.approx(0.5, rel=0.3)
+    assert found.deviance < problem.deviance(np.empty(0)) - 20.0
+
+
+def test_a_bias_is_seen_although_derivatives_have_gone_to_their_limits(aircraft) -> None:
+    """Truth: the vertical accelerometer reads 0.6 m/s^2 too much, and the file's narrow tolerances are kept."""
+    sure = {name: replace(d, tolerance=0.1 * d.tolerance) for name, d in aircraft.derivatives.items()}
+    file = replace(aircraft, derivatives=sure, noise_bias={**aircraft.noise_bias, "accel": 0.03})
+    model = residual_model_of(Simulator(file, 50.0), fly(file, {"imu_bias": {"az": 0.6}}, seed=18))
+    fit = converged(unfitted([model], nuisances_of(file, model)), rounds=1)
+    problem = VariableProjection(fit)
+    assert not problem.free.all()
+    (bias,) = (c for c in candidates_of(model.simulator, [model]) if c.label == "imu_bias")
+    found = screened(fit, problem, bias)
+    az = [model.simulator.names[i] for i in bias.indices].index("imu_bias.az")
+    assert found.start[az] == pytest.approx(0.6, rel=0.15)  # 0.44 with the derivatives at their limits
     assert found.deviance < problem.deviance(np.empty(0)) - 20.0
 
 
