@@ -42,7 +42,7 @@ def check_file(path: Path, inputs: Iterable[str | Path], mark: str, *, force: bo
 
 
 def write_file(path: Path, text: str) -> None:
-    """Write a text aside and move it into place; folders that lack are made. Raises InputError where this fails."""
+    """Write a text aside and move it into place; missing folders are made. Raises InputError where this fails."""
     aside = _aside(path)
     try:
         with indivisible():

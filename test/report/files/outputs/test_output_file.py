@@ -46,7 +46,7 @@ def test_a_file_that_cannot_be_written_is_refused(tmp_path, path):
         check_file(tmp_path / path, [], MARK, force=True)
 
 
-def test_folders_that_lack_are_made(tmp_path):
+def test_missing_folders_are_made(tmp_path):
     path = tmp_path / "models" / "plane" / "model.xml"
     check_file(path, [], MARK, force=False)
     assert not any(tmp_path.iterdir())  # before there is something to write
