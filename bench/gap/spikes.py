@@ -22,7 +22,7 @@ from bench.spikes import ledger, scores
 from bench.spikes.drawing import SETS, Case, draw
 from bench.spikes.editing import edited, misbelieved
 from bench.spikes.excusing import ratio_left
-from bench.spikes.records import FLIGHTS, belief, part, rate_of
+from bench.spikes.records import FLIGHTS, Flight, belief, part, rate_of
 from bench.withheld.ledger import version
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
@@ -77,9 +77,9 @@ def _time_of(until: str | None) -> float:
     return time.time() + 60.0 * (minutes % (24 * 60))
 
 
-def diagnosed(folder: Path, case: Case) -> dict[str, Any]:
-    """The line of a case: put into the flights and the belief, then diagnosed."""
-    flight = FLIGHTS[case.flight]
+def diagnosed(folder: Path, case: Case, flight: Flight | None = None) -> dict[str, Any]:
+    """The line of a case: put into the flights and the belief, then diagnosed; its own flight unless one is given."""
+    flight = flight or FLIGHTS[case.flight]
     aircraft = misbelieved(belief(folder, flight), case.effect, case.values)
     records = [
         [edited(part(folder, flight, span), case.effect, case.values) for span in spans]
