@@ -11,8 +11,9 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
 from sysid_node.gap.estimation.predictive_density import can_be_divided, transferred_parameters
-from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight, inferred_again
+from sysid_node.gap.flightdata.gap_flight import GapFlight, inferred_again
 from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre
+from sysid_node.gap.flightdata.time_scales import analysis_rate
 from sysid_node.gap.residuals.admissibility import require_admissible, require_distinct_flights
 from sysid_node.gap.residuals.air_motion import gust_speed
 from sysid_node.gap.residuals.build import residual_model_of
@@ -124,7 +125,8 @@ def _diagnosis(
     progress(0.0, "reading the flights as forces and moments")
     if len(flights) == 1 and not holdouts:
         flights = [cut_to_manoeuvre(flights[0], aircraft.control_symbols)]
-    simulator = Simulator(aircraft, ANALYSIS_RATE)
+    lateral = any(flight.lateral for flight in (*flights, *holdouts))
+    simulator = Simulator(aircraft, analysis_rate(aircraft, lateral=lateral))
     models, others = ([_model_of(simulator, flight, surrogate) for flight in group] for group in (flights, holdouts))
     room = surrogate.room if surrogate else {}
     nuisances, *theirs = (nuisances_of(aircraft, model, (*models, *others), room) for model in (models[0], *others))

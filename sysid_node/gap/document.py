@@ -15,7 +15,7 @@ from sysid_node.gap.residuals.excited_axes import quiet_motions
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.selection.calibration import calibrated_probability
 from sysid_node.gap.selection.causes import Cause
-from sysid_node.gap.short_flights.readings import WINDOW
+from sysid_node.gap.short_flights.readings import length_of
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.validation.standard_errors import standard_errors, with_standard_error
 from sysid_node.gap.verdict.decision import unexplained_share
@@ -34,7 +34,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "gap": {
             **gap_content(found.size),
             "measured_by": "short_flights" if found.simulation_gap else "forces_and_kinematics",
-            "window_s": WINDOW if found.simulation_gap else found.models[0].windows.length,
+            "window_s": length_of(found.models[0]) if found.simulation_gap else found.models[0].windows.length,
             "held_out": found.held_out,
             "forces_and_kinematics": {**gap_content(found.gap), "window_s": found.models[0].windows.length},
         },

@@ -243,6 +243,9 @@ class Validation:
     large_improvement: float = _threshold(
         0.7, "1", "ratio of the error with causes to the file's, by one measure, from which a tie by another is no veto"
     )
+    product: float = _threshold(
+        0.5, "1", "ratio of the product of two measures' errors to the file's below which one may be worse than a tie"
+    )
     tie: float = _threshold(1.05, "1", "ratio of the error with causes to the file's up to which it is a tie")
     unexcused: float = _threshold(
         1.1, "1", "largest ratio of the error with a cause to that of derivatives that no tolerances together excuse"

@@ -40,6 +40,10 @@ _OF_GROUND = frozenset({"ground_effect"})
 #: Parameters that only shape an effect and stay at their defaults: one flight seldom contains information on them.
 _FIXED = frozenset({"stall_separation.tau1", "structural_mode.damping", "actuator_lag.damping"})
 
+#: Parameters that motion in the plane of symmetry does not show. Where the lateral readings were not measured, they would
+#: stand for the motion that is not known: a bias of the yaw rate for the turn that a banked aircraft flies.
+_SIDEWAYS = frozenset({"ay", "p", "r", "beta", "y", "roll", "yaw", "Ixx", "Izz", "Ixz"})
+
 #: Effects with a parameter that all controls share and one for each control. There is a candidate of the shared one,
 #: one of each control alone, and one of every control by itself; of the actuators' lag also one of second order.
 SHARED = tuple(name for name, effect in EFFECTS.items() if effect.shared)
@@ -123,9 +127,10 @@ def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list
 
 
 def _whole(simulator: Simulator, models: Sequence[ResidualModel], effect: str) -> Candidate:
-    """The candidate of an effect with all its free parameters."""
+    """The candidate of an effect with all its free parameters; those of motion that was not measured are left out."""
+    lateral = any(model.flight.lateral for model in models)
     table = [(i, p) for i, (e, p) in enumerate(simulator.parameters)
-             if e == effect and f"{e}.{p.name}" not in _FIXED
+             if e == effect and f"{e}.{p.name}" not in _FIXED and (lateral or p.name not in _SIDEWAYS)
              and (effect not in SHARED or p.name == EFFECTS[effect].shared)]  # fmt: skip
     shaped, now = dict(_shapes(simulator, models, effect)), simulator.neutral()
     values = [

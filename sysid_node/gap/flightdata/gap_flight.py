@@ -23,7 +23,8 @@ from sysid_node.gap.flightdata.thrust import thrust_missing, with_inferred_thrus
 from sysid_node.sim.prediction.signals import unfiltered_columns
 from sysid_node.sim.signals.low_pass import gaussian_taps, low_passed
 
-#: Rate at which forces are predicted, Hz: more than ten times the highest frequency that is compared.
+#: Rate at which the forces of a small aircraft are predicted, Hz: more than ten times the highest frequency that is
+#: compared. A heavier one needs fewer (``time_scales.analysis_rate``).
 ANALYSIS_RATE = 50.0
 
 #: Shortest flight that can be diagnosed, s: three windows of at least a short period each.
@@ -163,7 +164,7 @@ def resampled(flight: GapFlight, rate: float = ANALYSIS_RATE) -> FlightRecord:
             columns[name] = _on_grid(record.time, whole, fine, smooth=name in _SMOOTH)
     for name in ("p", "q", "r"):
         columns[f"{name}_rate"] = _slope(columns[name], rate * factor)
-    taps = gaussian_taps(rate * factor)
+    taps = gaussian_taps(rate * factor, rate)
     low = {name: low_passed(values, taps)[::factor] for name, values in columns.items()}
     for name in columns.keys() - _SMOOTH - _TURNING - {f"{rate_name}_rate" for rate_name in "pqr"}:
         low |= _unfiltered(record, name, fine[::factor], 1.0 / rate)

@@ -1,4 +1,4 @@
-"""How fast an aircraft is: the band of frequencies in which it is compared.
+"""How fast an aircraft is: the band in which it is compared, at which rate, and how long a short flight is.
 
 A transport of 17 t answers its controls five times as slowly as a model aircraft. Above its own modes there is noise
 alone, which drowns angular accelerations, for these are slopes. So the band follows the natural frequencies that the
@@ -11,12 +11,19 @@ from collections.abc import Callable
 from math import isfinite, pi, sqrt
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE
 
 #: Highest frequency that is compared in any aircraft, Hz: above it, vanes contain little information.
 HIGHEST_FREQUENCY = 4.0
 
 #: The same as a multiple of the aircraft's fastest mode, whose response to a control has fallen there to a sixteenth.
 _OF_FASTEST = 4.0
+
+#: Lowest rate at which forces are predicted, Hz: lags and delays of a tenth of a second must be resolved.
+_SLOWEST_RATE = 12.5
+
+#: Least and greatest length of a short flight, s. The least is one or two short periods of a small aircraft.
+_SHORTEST, _LONGEST = 2.0, 8.0
 
 
 def highest_frequency(aircraft: Aircraft, *, lateral: bool) -> float:
@@ -30,6 +37,28 @@ def highest_frequency(aircraft: Aircraft, *, lateral: bool) -> float:
         return HIGHEST_FREQUENCY
     fastest = max(pitching, dutch_roll(aircraft), roll_subsidence(aircraft)) if lateral else pitching
     return min(HIGHEST_FREQUENCY, _OF_FASTEST * fastest)
+
+
+def analysis_rate(aircraft: Aircraft, *, lateral: bool) -> float:
+    """The rate (Hz) at which an aircraft's forces are predicted: halved while the band has as many samples as usual.
+
+    ``lateral``: whether the lateral motion was measured. A structural mode that the file states vibrates faster.
+    """
+    band, rate = highest_frequency(aircraft, lateral=lateral), ANALYSIS_RATE
+    if "structural_mode" in aircraft.effects:
+        return rate
+    while rate > _SLOWEST_RATE and band * ANALYSIS_RATE <= 0.5 * rate * HIGHEST_FREQUENCY:
+        rate *= 0.5
+    return rate
+
+
+def short_flight(aircraft: Aircraft) -> float:
+    """Length (s) of a short simulated flight: a short period, or two seconds where that is less.
+
+    Short flights show the dynamics before drift hides them.
+    """
+    frequency = short_period(aircraft)
+    return min(max(_SHORTEST, 1.0 / frequency), _LONGEST) if frequency else _SHORTEST
 
 
 def short_period(aircraft: Aircraft) -> float:

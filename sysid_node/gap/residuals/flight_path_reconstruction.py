@@ -29,6 +29,7 @@ from sysid_node.sim.effects.actuator_lag import first_order_series
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar, Values
 from sysid_node.sim.model.parameters import Parameters
+from sysid_node.sim.prediction.active_effects import evaluate_if
 from sysid_node.sim.signals.time_shift import shift_cubic, slope
 from sysid_node.sim.stations import sensors
 
@@ -158,14 +159,15 @@ def flow_of(chain: Chain, motion: InstrumentReadings, memory: Scalar | float, va
     ``vanes`` (2,) is one where alpha and beta were measured, and zero elsewhere.
     """
     samples = corrected_motion(chain, motion)
-    moving, _ = rates_of_change(samples.velocity, samples.attitude, samples.force, samples.rates)
-    velocity, rate = _followed(samples.velocity, moving, memory, chain.step)
-    _, alpha_rate, _ = flow_rates(velocity, rate, jnp)
-    still = jnp.zeros_like(alpha_rate)
-    followed = Flow(velocity, alpha_rate, Vector(still, still, still))
-    seen = _in_turning_air(chain, samples, vanes)
-    flow: Flow = jax.tree.map(lambda a, b: jnp.where(memory > 0.0, a, b), followed, seen)
-    return flow
+
+    def followed() -> Flow:
+        moving, _ = rates_of_change(samples.velocity, samples.attitude, samples.force, samples.rates)
+        velocity, rate = _followed(samples.velocity, moving, memory, chain.step)
+        _, alpha_rate, _ = flow_rates(velocity, rate, jnp)
+        still = jnp.zeros_like(alpha_rate)
+        return Flow(velocity, alpha_rate, Vector(still, still, still))
+
+    return evaluate_if(jnp.asarray(memory) > 0.0, followed, lambda: _in_turning_air(chain, samples, vanes))
 
 
 def _in_turning_air(chain: Chain, samples: Sample, vanes: Scalar) -> Flow:

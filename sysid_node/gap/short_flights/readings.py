@@ -11,6 +11,7 @@ from sysid_node.aircraft.names import LONGITUDINAL_SIGNALS
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.predictive_density import FlightEvidence, window_groups
 from sysid_node.gap.flightdata import thrust
+from sysid_node.gap.flightdata.time_scales import short_flight
 from sysid_node.gap.residuals.excited_axes import excited_motions, of_motions
 from sysid_node.gap.residuals.flight_path_reconstruction import motion_of
 from sysid_node.gap.residuals.prediction_cache import cache_of
@@ -18,9 +19,6 @@ from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.short_flights.multiple_shooting import Course, course_of, simulate_beside, simulation_error
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim.model.layout import OUTPUTS
-
-#: Length of a short flight, s: one or two short periods of a small aircraft, too short for drift to matter.
-WINDOW = 2.0
 
 #: Readings that are compared. Heading is left out, because it is the integral of the yaw rate.
 READINGS = ("ax", "ay", "az", "p", "q", "r", "phi", "theta", "V", "alpha", "beta")
@@ -48,7 +46,12 @@ def can_be_simulated(model: ResidualModel) -> bool:
 
 def size_of(model: ResidualModel) -> int:
     """Samples of a short flight."""
-    return round(WINDOW * model.simulator.rate)
+    return round(length_of(model) * model.simulator.rate)
+
+
+def length_of(model: ResidualModel) -> float:
+    """Length of a short flight, s."""
+    return round(short_flight(model.simulator.aircraft), 1)
 
 
 def course_of_flight(model: ResidualModel) -> Course:

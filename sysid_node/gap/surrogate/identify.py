@@ -12,7 +12,8 @@ from sysid_node.errors import InputError
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, unfitted, with_candidates
 from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import Nuisances, nuisances_of
-from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight
+from sysid_node.gap.flightdata.gap_flight import GapFlight
+from sysid_node.gap.flightdata.time_scales import analysis_rate
 from sysid_node.gap.residuals.admissibility import require_admissible
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
@@ -61,7 +62,7 @@ def identify_simulator(
     fitted, held_out = split(aircraft, simulated)
     progress(0.0, "reading the simulated flights as forces and moments")
     guess = first_guess(aircraft, simulated)
-    simulator = Simulator(guess, ANALYSIS_RATE)
+    simulator = Simulator(guess, analysis_rate(guess, lateral=any(flight.lateral for flight in simulated)))
     models = [resolved(require_admissible(residual_model_of(simulator, flight))) for flight in fitted]
     others = [resolved(residual_model_of(simulator, flight)) for flight in held_out]
     nuisances = nuisances_of(guess, models[0], (*models, *others))
@@ -71,7 +72,7 @@ def identify_simulator(
     found = estimated_aircraft(aircraft, fit)
     require_same_aircraft(aircraft, found, simulated)
     progress(0.9, "the simulator's model on simulated flight held out")
-    known = Simulator(replace(found, noise=guess.noise), ANALYSIS_RATE)
+    known = Simulator(replace(found, noise=guess.noise), simulator.rate)
     error = simulator_error([replace(model, simulator=known) for model in others], aircraft.noise)
     effects = tuple(dict.fromkeys(candidate.effect for candidate in fit.candidates))
     seconds = (sum(flight.record.duration for flight in flights) for flights in (fitted, held_out))
@@ -92,7 +93,7 @@ def _with_tables(fit: CandidateFit, nuisances: Nuisances, others: Sequence[Resid
     if not found:
         return fit
     tables = (*guess.tables, *(curve.table for curve in found))
-    simulator = Simulator(replace(guess, tables=tables), ANALYSIS_RATE)
+    simulator = Simulator(replace(guess, tables=tables), fit.simulator.rate)
     models = [replace(model, simulator=simulator) for model in fit.models]
     start = with_candidates(unfitted(models, nuisances), fit.candidates, nuisances, fit.values.tolist())
     return converged(start)

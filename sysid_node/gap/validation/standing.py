@@ -60,11 +60,12 @@ def file_predicts_better(errors: Sequence[Errors], thresholds: Thresholds = THRE
     """Whether the file predicts better than the fitted derivatives, by at least one measure.
 
     In gusts derivatives that these have biased may predict better by frequency. Where the fitted derivatives take away
-    a large share of the error by the last measure, that of short flights, they may tie with the file by the other.
+    a large share of the error by the last measure, that of short flights, they may tie with the file by the other; and
+    be worse by as much as still halves the product of both errors.
     """
-    limits = thresholds.validation
-    large = errors[-1].tolerances < limits.large_improvement * errors[-1].before
-    worst = limits.tie if large else 1.0
+    limits, last = thresholds.validation, errors[-1]
+    large = last.tolerances < limits.large_improvement * last.before
+    worst = max(limits.tie, limits.product * last.before / max(last.tolerances, 1e-300)) if large else 1.0
     return any(e.tolerances > worst * e.before for e in errors)
 
 

@@ -70,7 +70,7 @@ def actuators_of(chain: Chain, unfiltered: Scalar) -> Scalar:
     step = chain.step / factor
     arriving = command.arrive(chain.layout, chain.effects, unfiltered.reshape(samples * factor, controls), step)
     moved = _moved(chain, arriving, Servos.of(chain.layout, chain.effects, step), step)
-    return low_passed_every(moved, step, factor)
+    return low_passed_every(moved, factor)
 
 
 def _moved(chain: Chain, commands: Scalar, servos: Servos, step: Scalar) -> Scalar:

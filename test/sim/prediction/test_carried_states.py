@@ -45,7 +45,7 @@ def test_a_rate_limit_sees_commands_before_the_low_pass():
     command, position = 0.2 * ((time // 1.0) % 2 == 1), np.zeros(time.size)
     for k in range(1, time.size):
         position[k] = position[k - 1] + np.clip(command[k] - position[k - 1], -0.4 / fine, 0.4 / fine)
-    offsets = np.arange(-200, 201) / fine
+    offsets = np.arange(-200, 201) * 50.0 / fine
     taps = np.exp(-0.5 * (offsets / SPREAD) ** 2)
     truth = np.convolve(np.pad(position, 200, mode="edge"), taps / taps.sum(), mode="valid")
     recorded = np.zeros((200, 4, 3))

@@ -10,7 +10,7 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.residuals.residual_model import CHANNELS
-from sysid_node.gap.short_flights.readings import READINGS, WINDOW, can_be_simulated
+from sysid_node.gap.short_flights.readings import READINGS, can_be_simulated, length_of
 from sysid_node.gap.validation.handed_on import corrected_parameters
 from sysid_node.gap.validation.simulation_error import SideBySide, side_by_side
 from sysid_node.report.drawing import figures
@@ -43,7 +43,7 @@ def flight(found: Diagnosis) -> Mapping[str, Any]:
         "panels": panels,
         "held_out": found.held_out,
         "short": bool(found.simulation_gap),
-        "window": f"{WINDOW:g} s",
+        "window": f"{length_of(found.models[0]):g} s",
     }
 
 

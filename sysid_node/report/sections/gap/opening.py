@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
-from sysid_node.gap.short_flights.readings import WINDOW
+from sysid_node.gap.short_flights.readings import length_of
 from sysid_node.gap.validation.spectral_error import STAGES
 from sysid_node.report.sections.gap.paragraph import paragraph
 from sysid_node.report.wording.causes import WORDS, percent
@@ -31,7 +31,7 @@ def opening(found: Diagnosis) -> Mapping[str, Any]:
         "facts": facts,
         "next_flight": found.next_flight,
         "short": bool(found.simulation_gap),
-        "window": f"{WINDOW:g} s" if found.simulation_gap else f"{found.models[0].windows.length:.2g} s",
+        "window": f"{length_of(found.models[0]):g} s" if found.simulation_gap else f"{found.models[0].windows.length:.2g} s",
     }
 
 
@@ -46,7 +46,7 @@ def channels(found: Diagnosis) -> Mapping[str, Any]:
         "whole": [whole, ends],
         "measured_on": found.measured_on,
         "short": bool(found.simulation_gap),
-        "window": f"{WINDOW:g} s",
+        "window": f"{length_of(found.models[0]):g} s",
     }
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.document import document
 from sysid_node.gap.residuals.excited_axes import quiet_motions
-from sysid_node.gap.short_flights.readings import WINDOW
+from sysid_node.gap.short_flights.readings import length_of
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.report.wording.causes import (
     WORDS,
@@ -59,7 +59,7 @@ def _size(found: Diagnosis) -> str:
     sizes = reduction if found.attribution.causes else before
     worst = max(sizes, key=lambda words: sizes[words])
     return (
-        f"The simulator, restarted every {WINDOW:g} s from the measured state, differs from the flight by "
+        f"The simulator, restarted every {length_of(found.models[0]):g} s from the measured state, differs from the flight by "
         f"{percent(gap.before)} of the motion, and in its {worst} by {percent(before[worst])}."
     )
 

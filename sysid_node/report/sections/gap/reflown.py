@@ -7,7 +7,7 @@ from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.reflying import InSimulator
-from sysid_node.gap.short_flights.readings import WINDOW
+from sysid_node.gap.short_flights.readings import length_of
 from sysid_node.report.sections.gap.flight import short_flight_panels
 from sysid_node.report.wording.causes import WORDS, label_words, percent
 from sysid_node.report.wording.numbers import number
@@ -18,7 +18,7 @@ _STAGES = ("before", "after", "noise_floor")
 def reflown(found: Diagnosis, flown: InSimulator) -> Mapping[str, Any]:
     """Errors before and after as flown there, the traces of both, and what the simulator's model cannot hold."""
     left_out = [(label_words(effect), why) for effect, why in flown.left_out.items()]
-    content: dict[str, Any] = {"left_out": left_out, "simulator": flown.simulator.label, "window": f"{WINDOW:g} s"}
+    content: dict[str, Any] = {"left_out": left_out, "simulator": flown.simulator.label, "window": f"{length_of(found.models[0]):g} s"}
     if flown.result is None:
         return {**content, "flown": False}
     gap, (low, high) = flown.result.gap, flown.result.gap.ci95
