@@ -40,8 +40,8 @@ _OF_GROUND = frozenset({"ground_effect"})
 #: Parameters that only shape an effect and stay at their defaults: one flight seldom contains information on them.
 _FIXED = frozenset({"stall_separation.tau1", "structural_mode.damping", "actuator_lag.damping"})
 
-#: Parameters that motion in the plane of symmetry does not show. Where the lateral readings were not measured, they would
-#: stand for the motion that is not known: a bias of the yaw rate for the turn that a banked aircraft flies.
+#: Parameters that motion in the plane of symmetry does not show. Where the lateral readings were not measured, they
+#: would stand for the motion that is not known: a bias of the yaw rate for the turn that a banked aircraft flies.
 _SIDEWAYS = frozenset({"ay", "p", "r", "beta", "y", "roll", "yaw", "Ixx", "Izz", "Ixz"})
 
 #: Effects with a parameter that all controls share and one for each control. There is a candidate of the shared one,

@@ -8,7 +8,7 @@ aircraft file gives (Etkin & Reid (1996), Dynamics of Flight, secs. 6.3 and 6.7:
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite, pi, sqrt
+from math import ceil, isfinite, pi, sqrt
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE
@@ -20,7 +20,7 @@ HIGHEST_FREQUENCY = 4.0
 _OF_FASTEST = 4.0
 
 #: Lowest rate at which forces are predicted, Hz: lags and delays of a tenth of a second must be resolved.
-_SLOWEST_RATE = 12.5
+_SLOWEST_RATE = 12.0
 
 #: Least and greatest length of a short flight, s. The least is one or two short periods of a small aircraft.
 _SHORTEST, _LONGEST = 2.0, 8.0
@@ -40,16 +40,14 @@ def highest_frequency(aircraft: Aircraft, *, lateral: bool) -> float:
 
 
 def analysis_rate(aircraft: Aircraft, *, lateral: bool) -> float:
-    """The rate (Hz) at which an aircraft's forces are predicted: halved while the band has as many samples as usual.
+    """The rate (whole Hz) at which an aircraft's forces are predicted: in proportion to the highest frequency.
 
     ``lateral``: whether the lateral motion was measured. A structural mode that the file states vibrates faster.
     """
-    band, rate = highest_frequency(aircraft, lateral=lateral), ANALYSIS_RATE
     if "structural_mode" in aircraft.effects:
-        return rate
-    while rate > _SLOWEST_RATE and band * ANALYSIS_RATE <= 0.5 * rate * HIGHEST_FREQUENCY:
-        rate *= 0.5
-    return rate
+        return ANALYSIS_RATE
+    share = highest_frequency(aircraft, lateral=lateral) / HIGHEST_FREQUENCY
+    return float(max(_SLOWEST_RATE, ceil(share * ANALYSIS_RATE)))
 
 
 def short_flight(aircraft: Aircraft) -> float:

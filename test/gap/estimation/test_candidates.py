@@ -28,6 +28,20 @@ def test_the_ground_is_a_candidate_where_the_file_says_how_far_it_is(plain_model
     assert "ground_effect" in {c.effect for c in candidates_of(model.simulator, [model])}
 
 
+def test_what_the_plane_of_symmetry_does_not_show_is_free_where_lateral_readings_were_measured(plain_model) -> None:
+    """A bank without a turn would be a bias of the yaw rate: theta' = q cos(phi) - r sin(phi)."""
+    flight = replace(plain_model.flight, lateral=False)
+    in_plane, all_axes = (
+        {c.label: {names[i] for i in c.indices} for c in candidates_of(plain_model.simulator, [model])}
+        for names in [plain_model.simulator.names]
+        for model in (replace(plain_model, flight=flight), plain_model)
+    )
+    assert in_plane["imu_bias"] == {"imu_bias.ax", "imu_bias.az", "imu_bias.q"}
+    assert in_plane["cg_shift"] == {"cg_shift.x", "cg_shift.z"}
+    assert in_plane["inertia_error"] == {"inertia_error.Iyy"}
+    assert all_axes["imu_bias"] == in_plane["imu_bias"] | {"imu_bias.ay", "imu_bias.p", "imu_bias.r"}
+
+
 def test_labels_are_unique(candidates) -> None:
     labels = [c.label for c in candidates]
     assert len(set(labels)) == len(labels)

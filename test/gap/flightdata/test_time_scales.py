@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Derivative, ReferenceCondition
-from sysid_node.gap.flightdata.time_scales import dutch_roll, highest_frequency, roll_subsidence, short_period
+from sysid_node.aircraft.model import Aircraft, Derivative, ReferenceCondition, UncertainValue
+from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE
+from sysid_node.gap.flightdata.time_scales import (
+    analysis_rate,
+    dutch_roll,
+    highest_frequency,
+    roll_subsidence,
+    short_flight,
+    short_period,
+)
 
 
 def test_modes_are_those_of_the_eigenvalues() -> None:
@@ -27,14 +35,39 @@ def test_modes_follow_the_airspeed() -> None:
         assert mode(slow) == pytest.approx(0.5 * mode(aircraft))
 
 
-def test_the_band_of_a_small_aircraft_is_the_widest_and_that_of_a_heavy_one_narrow() -> None:
+@pytest.fixture(scope="module")
+def heavy() -> Aircraft:
+    """An aircraft whose modes are slower by the square root of thirty, and by thirty in roll."""
     aircraft = load_aircraft("cdrw")
-    assert highest_frequency(aircraft, lateral=True) == highest_frequency(aircraft, lateral=False) == 4.0
     inertia = replace(aircraft.inertia, Ixx=30.0 * aircraft.inertia.Ixx, Iyy=30.0 * aircraft.inertia.Iyy,
                       Izz=30.0 * aircraft.inertia.Izz)  # fmt: skip
-    heavy = replace(aircraft, inertia=inertia, mass=30.0 * aircraft.mass)
+    return replace(aircraft, inertia=inertia, mass=30.0 * aircraft.mass)
+
+
+def test_the_band_of_a_small_aircraft_is_the_widest_and_that_of_a_heavy_one_narrow(heavy: Aircraft) -> None:
+    aircraft = load_aircraft("cdrw")
+    assert highest_frequency(aircraft, lateral=True) == highest_frequency(aircraft, lateral=False) == 4.0
     assert highest_frequency(heavy, lateral=False) == pytest.approx(4.0 * short_period(heavy))
     assert highest_frequency(heavy, lateral=True) < 2.0
+
+
+def test_a_narrow_band_needs_fewer_samples(heavy: Aircraft) -> None:
+    """There are at least as many for each period of the highest frequency as those of a small aircraft."""
+    aircraft = load_aircraft("cdrw")
+    assert analysis_rate(aircraft, lateral=True) == ANALYSIS_RATE
+    samples = ANALYSIS_RATE / highest_frequency(aircraft, lateral=False)
+    of_heavy = analysis_rate(heavy, lateral=False) / highest_frequency(heavy, lateral=False)
+    assert samples <= of_heavy < 1.1 * samples
+    vibrating = replace(heavy, effects={"structural_mode": {"frequency": UncertainValue(5.0)}})
+    assert analysis_rate(vibrating, lateral=False) == ANALYSIS_RATE
+
+
+def test_a_short_flight_is_a_short_period_or_two_seconds(heavy: Aircraft) -> None:
+    assert short_flight(load_aircraft("cdrw")) == 2.0
+    assert short_flight(heavy) == pytest.approx(1.0 / short_period(heavy))
+    assert 3.0 < short_flight(heavy) < 4.0
+    bare = replace(heavy, derivatives={**heavy.derivatives, "Cm_alpha": Derivative(0.0)})
+    assert short_flight(bare) == 2.0
 
 
 def test_a_file_without_a_pitching_slope_says_nothing_of_the_band() -> None:

@@ -75,6 +75,8 @@ def test_the_file_predicts_better_by_one_measure(tolerances: float, better: bool
         (1.06, 0.69, True),
         (1.04, 0.71, True),  # beside a small one
         (0.69, 1.04, True),  # gusts bias derivatives, which then predict better by frequency
+        (1.6, 0.3, False),  # the file flies three times as far off, and the product of both errors is halved
+        (1.7, 0.3, True),  # it is not
     ],
 )
 def test_a_tie_by_frequency_does_not_keep_a_file_that_flies_far_off(

@@ -21,6 +21,7 @@ def opening(found: Diagnosis) -> Mapping[str, Any]:
     """The paragraph and the figures beside it."""
     gap = found.size
     low, high = gap.ci95
+    length = f"{length_of(found.models[0]):g}" if found.simulation_gap else f"{found.models[0].windows.length:.2g}"
     facts = [
         ("Verdict", words_of(found.verdict)),
         *((words, percent(getattr(gap, stage))) for words, stage in zip(_STAGE_WORDS, STAGES, strict=True)),
@@ -31,7 +32,7 @@ def opening(found: Diagnosis) -> Mapping[str, Any]:
         "facts": facts,
         "next_flight": found.next_flight,
         "short": bool(found.simulation_gap),
-        "window": f"{length_of(found.models[0]):g} s" if found.simulation_gap else f"{found.models[0].windows.length:.2g} s",
+        "window": f"{length} s",
     }
 
 

@@ -58,8 +58,9 @@ def _size(found: Diagnosis) -> str:
     reduction = {words: before[words] ** 2 - after[words] ** 2 for words in _RESPONSES}
     sizes = reduction if found.attribution.causes else before
     worst = max(sizes, key=lambda words: sizes[words])
+    every = f"{length_of(found.models[0]):g} s"
     return (
-        f"The simulator, restarted every {length_of(found.models[0]):g} s from the measured state, differs from the flight by "
+        f"The simulator, restarted every {every} from the measured state, differs from the flight by "
         f"{percent(gap.before)} of the motion, and in its {worst} by {percent(before[worst])}."
     )
 

@@ -18,7 +18,8 @@ _STAGES = ("before", "after", "noise_floor")
 def reflown(found: Diagnosis, flown: InSimulator) -> Mapping[str, Any]:
     """Errors before and after as flown there, the traces of both, and what the simulator's model cannot hold."""
     left_out = [(label_words(effect), why) for effect, why in flown.left_out.items()]
-    content: dict[str, Any] = {"left_out": left_out, "simulator": flown.simulator.label, "window": f"{length_of(found.models[0]):g} s"}
+    window = f"{length_of(found.models[0]):g} s"
+    content: dict[str, Any] = {"left_out": left_out, "simulator": flown.simulator.label, "window": window}
     if flown.result is None:
         return {**content, "flown": False}
     gap, (low, high) = flown.result.gap, flown.result.gap.ci95
