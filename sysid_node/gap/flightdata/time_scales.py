@@ -19,8 +19,9 @@ HIGHEST_FREQUENCY = 4.0
 #: The same as a multiple of the aircraft's fastest mode, whose response to a control has fallen there to a sixteenth.
 _OF_FASTEST = 4.0
 
-#: Lowest rate at which forces are predicted, Hz: lags and delays of a tenth of a second must be resolved.
-_SLOWEST_RATE = 12.0
+#: Lowest rate at which forces are predicted, Hz: the simulator's structural mode, which is there at rest even where no
+#: effect excites it, is integrated in steps of as many samples, and grows without bound where these are longer.
+_SLOWEST_RATE = 20.0
 
 #: Least and greatest length of a short flight, s. The least is one or two short periods of a small aircraft.
 _SHORTEST, _LONGEST = 2.0, 8.0
