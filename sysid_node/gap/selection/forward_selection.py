@@ -21,7 +21,7 @@ from sysid_node.gap.instruments.overidentification import (
     pooled_overidentification,
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.selection.acceptance import is_accepted, relieves
+from sysid_node.gap.selection.acceptance import is_accepted, predicts_better, relieves
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress
 from sysid_node.gap.selection.causes import Cause, select_causes
 from sysid_node.gap.selection.comparison import Comparison, derivative_shift
@@ -139,8 +139,8 @@ def _forward(
     """The explanation that forward selection ends with, and what was fitted in each stage, the best first.
 
     In each stage candidates are added to the best explanations of the stage before, of which the best need not be part
-    of the best larger one. It goes on as long as a candidate is accepted, and the larger explanation is accepted in
-    place of the best smaller one, too: what mends a poor explanation need not be worth another cause.
+    of the best larger one. It goes on as long as a candidate is accepted, and the larger explanation may also take the
+    best smaller one's place: what mends a poor explanation need not be worth another cause.
     """
     best, frontier, stages = base, [base], list[list[FittedSet]]()
     for count, (width, most) in enumerate(THRESHOLDS.search.stages):
@@ -151,13 +151,24 @@ def _forward(
         better = [
             larger
             for smaller, larger in fitted
-            if is_accepted(Comparison(base, best, larger))
+            if _takes_the_place(base, best, larger)
             and (smaller is best or is_accepted(Comparison(base, smaller, larger)))
         ]
         if not better:
             break
         best, frontier = better[0], better
     return best, stages
+
+
+def _takes_the_place(base: FittedSet, best: FittedSet, larger: FittedSet) -> bool:
+    """Whether an explanation with a cause more is accepted in place of the best so far.
+
+    One with no more parameters need only predict better beyond doubt: a lag and a delay are two causes, but no more
+    than one lag of second order.
+    """
+    comparison = Comparison(base, best, larger)
+    sizes = (sum(len(each.entries) for each in explanation.fit.candidates) for explanation in (larger, best))
+    return is_accepted(comparison) or (next(sizes) <= next(sizes) and predicts_better(comparison.probability))
 
 
 def _share_of(progress: Progress, count: int) -> Progress:

@@ -212,3 +212,12 @@ def test_a_file_of_another_mass_is_left_for_derivatives_that_fly_the_record() ->
     gap = diagnosed(RECORDS, Case(0, "hfb320", "mass_error", {"error": 0.25}), as_recorded)["gap"]
     assert gap["before"] > 5.0
     assert gap["after"] < 0.2 * gap["before"]
+
+
+@pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
+def test_late_commands_beside_a_lag_are_no_servo_of_second_order() -> None:
+    """Both have as many parameters, and the lag and the delay predict the record better."""
+    causes = diagnosed(RECORDS, Case(0, "cessna_de", "command_delay", {"delay": 0.09}))["causes"]
+    assert {cause["label"] for cause in causes} == {"command_delay", "actuator_lag"}
+    (delay,) = (cause["parameters"]["elevator"] for cause in causes if cause["effect"] == "command_delay")
+    assert delay[0] == pytest.approx(0.09, rel=0.2)
