@@ -83,7 +83,7 @@ def test_a_file_without_a_pitching_slope_says_nothing_of_the_band() -> None:
 
 
 def test_the_simulator_is_stable_at_the_lowest_rate(heavy: Aircraft) -> None:
-    """The rule of fourth order is stable for w h < 2.83; the structural mode of 8 Hz at 20 Hz has 2.51, at 16 Hz 3.14."""
+    """The rule of fourth order is stable for w h < 2.83; a structural mode of 8 Hz has 2.51 at 20 Hz, 3.14 at 16 Hz."""
     simulator = Simulator(heavy, analysis_rate(heavy, lateral=True))
     start = simulator.initial(airspeed=heavy.reference.airspeed)
     commands = np.zeros((4000, len(simulator.commands)))
