@@ -37,10 +37,10 @@ _SIMULATED = (
     (*_PLAIN, *(word for s in ("elevator", "aileron", "rudder") for word in ("--manoeuvre", f"3211:{s}:repeat=6"))),
     (*_PLAIN, "--manoeuvre", "multisine"),
 )
-#: What the transport flies: 3-2-1-1 after 3-2-1-1, ten on each surface.
+#: What the transport flies: 3-2-1-1 after 3-2-1-1 of 7 s, twelve on each surface, so that nothing is left out.
 _LONG = (
     *("--effect", "actuator_lag:time_constant=0.3", "--turbulence", "light", "--rate", "25", "--duration", "200"),
-    *(word for s in ("elevator", "aileron", "rudder") for word in ("--manoeuvre", f"3211:{s}:repeat=10")),
+    *(word for s in ("elevator", "aileron", "rudder") for word in ("--manoeuvre", f"3211:{s}:repeat=12:width=1")),
 )
 
 
