@@ -5,7 +5,7 @@
 One flight of 60 s at 100 Hz (cdrw, light turbulence, an actuator's lag) is held against three files: the file as it is,
 the same with servos and two tables, and a surrogate that is identified from two simulated flights of 60 s. JSBSim's
 c172p is imported, with a hundred tables, and held against a flight of its own; so is the same file without its tables.
-So is JSBSim's 737, a transport of 40 t, against 200 s of its flight at 25 Hz. Programs are kept. Run it on an idle
+So is JSBSim's 737 against 200 s of its flight at 25 Hz. Programs are kept. Run it on an idle
 machine; the ratio of two files tells of any.
 """
 

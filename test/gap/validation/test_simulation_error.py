@@ -9,7 +9,6 @@ import pytest
 from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.short_flights.readings import size_of
 from sysid_node.gap.validation.simulation_error import side_by_side, simulation_gap, weather_suffices
 from sysid_node.sim import Simulator
 
@@ -53,7 +52,7 @@ def test_short_flights_begin_where_the_flight_is(plain_model) -> None:
     """The simulator reads what was measured at the start of each, and departs from it later."""
     beside = side_by_side(plain_model, [plain_model.simulator.vector({"mass_error": {"error": 0.3}})])
     begins = np.flatnonzero(beside.begins)
-    assert np.diff(begins) == pytest.approx(size_of(plain_model))
+    assert np.diff(begins) == pytest.approx(2.0 * plain_model.simulator.rate)
     off = np.abs(beside.measured - beside.before)[:, 9]
     np.testing.assert_allclose(off[begins], 0.0, atol=1e-9)
     assert off.max() > 0.05
