@@ -14,6 +14,7 @@ from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, Candid
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, Nuisances
 from sysid_node.gap.estimation.predictive_density import probabilities
+from sysid_node.gap.estimation.restriction import insignificant_sizes, restricted
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.instruments.overidentification import (
     OveridentificationTest,
@@ -46,6 +47,7 @@ class Attribution:
     first_stage: tuple[FittedSet, ...] = ()  # these candidates, fitted
     held_out: tuple[HeldOutFlight, ...] = ()
     size_source: CandidateFit | None = None  # of the sizes, where the corrected fit has the file's derivatives
+    held: tuple[int, ...] = ()  # entries of causes' sizes that were held at the aircraft file's values
 
     @property
     def keeps_file_derivatives(self) -> bool:
@@ -80,6 +82,14 @@ class Attribution:
         """The same causes with the sizes of least squares."""
         return replace(self, corrected=self.chosen.fit, size_source=None)
 
+    def without_insignificant_sizes(self) -> Attribution | None:
+        """The same causes with insignificant sizes at the file's values; none where all are significant."""
+        held = insignificant_sizes(self.size_fit)
+        if not held:
+            return None
+        moved = replace(self, corrected=restricted(self.size_fit, held), size_source=None, held=held)
+        return moved.with_file_derivatives() if self.keeps_file_derivatives else moved
+
     def with_fewer_causes(self) -> Iterator[Attribution]:
         """Each cause left out in turn, the least probable first; of three also each alone, the most probable first."""
         by_probability = sorted(self.causes, key=lambda cause: cause.probability)
@@ -99,7 +109,9 @@ class Attribution:
         """The same with fewer causes."""
         left = pooled_overidentification(chosen.fit, self.held_out)
         corrected = liml_estimate(chosen.fit)
-        return replace(self, chosen=chosen, corrected=corrected, size_source=None, structure_left=left, causes=causes)
+        return replace(
+            self, chosen=chosen, corrected=corrected, size_source=None, held=(), structure_left=left, causes=causes
+        )
 
 
 def attribute(

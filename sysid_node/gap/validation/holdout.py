@@ -104,7 +104,10 @@ def check(attribution: Attribution, held_out: Sequence[HeldOutFlight]) -> Check:
     else:
         base = kfold_evidence(attribution.base.evidence, liml_estimate(attribution.base.fit))
         final = kfold_evidence(
-            attribution.chosen.evidence, attribution.corrected, filed=attribution.keeps_file_derivatives
+            attribution.chosen.evidence,
+            attribution.corrected,
+            filed=attribution.keeps_file_derivatives,
+            held=attribution.held,
         )
     gap = spectral_error.gap_of(base, final, attribution.structure_left)
     return Check(base, final, gap, attribution)
@@ -148,7 +151,7 @@ def standing_explanation(attribution: Attribution, validator: Validator) -> tupl
             continue
         found = _with_better_derivatives(*found, validator)
         if _stands(*found):
-            return _without_needless_causes(*found, validator)
+            return _without_insignificant_sizes(*_without_needless_causes(*found, validator), validator)
     bare = attribution.without_causes()
     return bare, validator(bare)
 
@@ -176,6 +179,23 @@ def _without_needless_causes(
         except np.linalg.LinAlgError:
             continue
     return min(fewer, key=lambda each: (len(each[0].causes), each[1].gaps[-1].after), default=(attribution, checked))
+
+
+def _without_insignificant_sizes(
+    attribution: Attribution, checked: Check, validator: Validator
+) -> tuple[Attribution, Check]:
+    """The causes with insignificant sizes at the file's values, where all measures are at least as good."""
+    smaller = attribution.without_insignificant_sizes()
+    if smaller is None:
+        return attribution, checked
+    try:
+        found = validator(smaller)
+    except np.linalg.LinAlgError:
+        return attribution, checked
+    if not is_needless(checked.gaps, found.gaps):
+        return attribution, checked
+    gap = spectral_error.gap_of(checked.base, found.final, attribution.structure_left)
+    return smaller, replace(found, base=checked.base, gap=gap, fitted=checked.fitted)
 
 
 def _explanations(attribution: Attribution) -> Iterator[Attribution]:

@@ -1,0 +1,67 @@
+"""Sizes of causes that are held at the aircraft file's values, because the flight does not show that they differ.
+
+A cause has all the parameters of its effect: a shift of the centre of gravity along three axes, six scales of an IMU.
+Mostly one of them is really off. The others are fitted to what no model describes, and another flight is then predicted
+worse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sysid_node.flight.record import Array
+from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, stepped
+
+#: Standard errors within which a size is insignificant: those of a 95 % interval.
+_INTERVAL = 1.96
+
+
+def insignificant_sizes(fit: CandidateFit) -> tuple[int, ...]:
+    """Entries of the parameter vector of a cause's sizes whose 95 % intervals hold the aircraft file's values.
+
+    They are found one at a time, the least significant first, the others free (backward elimination: Klein & Morelli
+    (2006), Aircraft System Identification, sect. 5.4). Each cause keeps its most significant size.
+    """
+    simulator, chosen = fit.simulator, list(fit.indices)
+    away = fit.values - simulator.neutral()[chosen]
+    covariance = fit.covariance[: len(chosen), : len(chosen)]
+    held: list[int] = []
+    while True:
+        ratios = _ratios(away, covariance, held)
+        kept = {
+            max((chosen.index(i) for i in c.indices), key=lambda k: abs(ratios[k])) for c in fit.candidates if c.indices
+        }
+        rest = [k for k in np.flatnonzero(fit.sizing).tolist() if k not in held and k not in kept]
+        least = min(rest, key=lambda k: abs(ratios[k]), default=None)
+        if least is None or abs(ratios[least]) > _INTERVAL:
+            return tuple(chosen[k] for k in held)
+        held.append(least)
+
+
+def restricted(fit: CandidateFit, held: Sequence[int]) -> CandidateFit:
+    """The fit with these entries of its sizes at the aircraft file's values, and all else where it is best then.
+
+    Restricted least squares (Seber & Lee (2003), Linear Regression Analysis, sect. 3.8.1). The information stays that
+    of the fit in which nothing is held: the standard errors do not forget that it was not known before.
+    """
+    assert fit.information is not None
+    places = [fit.indices.index(i) for i in held]
+    free = np.setdiff1d(np.arange(fit.information.shape[0]), places)
+    step = np.zeros(fit.information.shape[0])
+    step[places] = fit.simulator.neutral()[list(held)] - fit.values[places]
+    normal, right = fit.information[np.ix_(free, free)], fit.information[np.ix_(free, places)] @ step[places]
+    step[free] = -np.linalg.solve(normal, right)
+    return replace(linearised(stepped(fit, step)), information=fit.information)
+
+
+def _ratios(away: Array, covariance: Array, held: Sequence[int]) -> Array:
+    """Sizes (K,) in their standard errors, with some held at zero; those that are held are zero."""
+    information = np.linalg.inv(covariance)
+    free = np.setdiff1d(np.arange(away.size), held).astype(int)
+    ratios, normal = np.zeros(away.size), information[np.ix_(free, free)]
+    best = away[free] + np.linalg.solve(normal, information[np.ix_(free, np.array(held, int))] @ away[list(held)])
+    ratios[free] = best / np.sqrt(np.diag(np.linalg.inv(normal)))
+    return ratios
