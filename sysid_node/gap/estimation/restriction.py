@@ -48,7 +48,7 @@ def restricted(fit: CandidateFit, held: Sequence[int]) -> CandidateFit:
     of the fit in which nothing is held: the standard errors do not forget that it was not known before.
     """
     assert fit.information is not None
-    places = [fit.indices.index(i) for i in held]
+    places = np.array([fit.indices.index(i) for i in held], int)
     free = np.setdiff1d(np.arange(fit.information.shape[0]), places)
     step = np.zeros(fit.information.shape[0])
     step[places] = fit.simulator.neutral()[list(held)] - fit.values[places]

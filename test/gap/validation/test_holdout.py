@@ -23,6 +23,7 @@ class Explanation:
     smaller: tuple[float, ...] = ()  # with fewer causes
     relieves_derivatives: bool = False
     keeps_file_derivatives: bool = False
+    held: float | None = None  # with its insignificant sizes held at the file's values; none where it has none
 
     def by_least_squares(self) -> "Explanation":
         return Explanation(self.chosen.fit)
@@ -32,6 +33,9 @@ class Explanation:
 
     def with_file_derivatives(self) -> "Explanation":
         return Explanation(-np.eye(2))  # predicts nothing
+
+    def without_insignificant_sizes(self) -> "Explanation | None":
+        return None if self.held is None else Explanation(self.held * np.eye(2))
 
     def without_causes(self) -> "Explanation":
         return Explanation(np.eye(2), causes=())
@@ -66,6 +70,25 @@ def test_one_cause_that_predicts_nothing_does_not_take_the_other_with_it() -> No
     explanation = Explanation(wild, SimpleNamespace(fit=wild), ("sound", "wild"), smaller=(1.5, 4.0, 9.0))
     _, checked = standing_explanation(explanation, by_cholesky)
     assert checked.size == pytest.approx(4.0)  # the first of those with fewer causes that predicts better
+
+
+@pytest.mark.parametrize("held", [-1.0, 8.9, None])
+def test_sizes_without_which_other_flight_is_predicted_worse_stay(held: float | None) -> None:
+    explanation = Explanation(9.0 * np.eye(2), held=held)
+    found, checked = standing_explanation(explanation, by_cholesky)
+    assert found is explanation and checked.size == pytest.approx(9.0)
+
+
+def test_sizes_that_no_flight_shows_are_those_of_the_file(aircraft) -> None:
+    """The probe reads yaw and roll too; its bias of alpha alone is off in both flights."""
+    biased = {"vane_bias": {"alpha": 0.05}}
+    found = diagnose(aircraft, [fly(aircraft, biased, seed=5)], [fly(aircraft, biased, seed=6)])
+    (cause,) = found.attribution.causes
+    names = [found.attribution.corrected.simulator.parameters[i][1].name for i in cause.candidate.indices]
+    sizes = dict(zip(names, found.attribution.corrected.values, strict=True))
+    assert cause.candidate.effect == "vane_bias"
+    assert sizes.pop("alpha") == pytest.approx(0.05, rel=0.1)
+    assert [*sizes.values()] == [0.0]
 
 
 def test_causes_beside_the_file_keep_their_size_and_leave_the_derivatives(lagging) -> None:

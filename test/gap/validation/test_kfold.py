@@ -35,6 +35,17 @@ def test_nuisances_may_be_held(aircraft, plain_model) -> None:
         np.testing.assert_allclose(point[own], fitted, rtol=0.0, atol=1e-5 * np.ptp(fitted))
 
 
+def test_sizes_may_be_held(aircraft, plain_model) -> None:
+    nuisances = nuisances_of(aircraft, plain_model)
+    (scales,) = (c for c in candidates_of(plain_model.simulator, [plain_model]) if c.label == "imu_scale")
+    fit = converged(with_candidates(unfitted([plain_model], nuisances), [scales], nuisances, [0.0] * 6))
+    held, moved = list(fit.indices[:2]), list(fit.indices[2:])
+    evidence = kfold_evidence(cross_validated_evidence(fit), fit, held=held)
+    for point in evidence.flights[0].points:
+        np.testing.assert_allclose(point[held], fit.values[:2], rtol=1e-4)
+        assert (point[moved] != fit.values[2:]).any()
+
+
 def test_an_onset_stays_where_the_whole_flight_has_it(aircraft) -> None:
     """Without the parts about it, nothing tells of it; a linear step would lead anywhere."""
     lost = {"control_effectiveness_loss": {"elevator": 0.5, "onset": 12.0}}
