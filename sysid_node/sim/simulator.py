@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 #: Largest reading that a flight can reach without having diverged, SI units.
 _LARGEST_READING = 1e4
 
+#: Least and greatest sampling rate, Hz.
+LOWEST_RATE, _HIGHEST_RATE = 10.0, 10000.0
+
 #: Span of the aircraft for which the effects state how far a place may be off, m: a small UAV's.
 _SPAN = 1.5
 
@@ -56,8 +59,8 @@ class Simulator:
     rate: float = 100.0
 
     def __post_init__(self) -> None:
-        if not 10.0 <= self.rate <= 10000.0:
-            raise InputError(f"rate {self.rate:g} Hz: expected 10 to 10000 Hz")
+        if not LOWEST_RATE <= self.rate <= _HIGHEST_RATE:
+            raise InputError(f"rate {self.rate:g} Hz: expected {LOWEST_RATE:g} to {_HIGHEST_RATE:g} Hz")
 
     @cached_property
     def layout(self) -> ParameterLayout:

@@ -12,16 +12,13 @@ from math import ceil, isfinite, pi, sqrt
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE
+from sysid_node.sim.simulator import LOWEST_RATE
 
 #: Highest frequency that is compared in any aircraft, Hz: above it, vanes contain little information.
 HIGHEST_FREQUENCY = 4.0
 
 #: The same as a multiple of the aircraft's fastest mode, whose response to a control has fallen there to a sixteenth.
 _OF_FASTEST = 4.0
-
-#: Lowest rate at which forces are predicted, Hz: the simulator's structural mode, which is there at rest even where no
-#: effect excites it, is integrated in steps of as many samples, and grows without bound where these are longer.
-_SLOWEST_RATE = 20.0
 
 #: Least and greatest length of a short flight, s. The least is one or two short periods of a small aircraft.
 _SHORTEST, _LONGEST = 2.0, 8.0
@@ -48,7 +45,7 @@ def analysis_rate(aircraft: Aircraft, *, lateral: bool) -> float:
     if "structural_mode" in aircraft.effects:
         return ANALYSIS_RATE
     share = highest_frequency(aircraft, lateral=lateral) / HIGHEST_FREQUENCY
-    return float(max(_SLOWEST_RATE, ceil(share * ANALYSIS_RATE)))
+    return float(max(LOWEST_RATE, ceil(share * ANALYSIS_RATE)))
 
 
 def short_flight(aircraft: Aircraft) -> float:

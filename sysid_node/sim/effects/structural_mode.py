@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
+from sysid_node.sim.effects.actuator_lag import advance as follow
+from sysid_node.sim.effects.actuator_lag import transition
 from sysid_node.sim.effects.base import Effect, SimulationParameter, fixed
 from sysid_node.sim.model.layout import Scalar, Values
 
@@ -22,6 +24,16 @@ EFFECT = Effect(
         SimulationParameter("damping", "1", "damping ratio", 0.02, 0.05, 0.001, 1.0, False),
     ),
 )
+
+
+def advance(values: Values, x: Scalar, v: Scalar, load0: Scalar, load1: Scalar, step: Scalar) -> tuple[Scalar, Scalar]:
+    """Displacement (m) and speed (m/s) one step (s) later, as the force along z goes from load0 to load1 (m/s^2).
+
+    Exact for a force linear in time, whatever the step: the mode is a lag of second order that follows its steady
+    displacement.
+    """
+    past = transition(0.5 / (jnp.pi * values["frequency"]), values["damping"], step)
+    return follow(past, x, v, steady(values, load0), steady(values, load1), step)
 
 
 def acceleration(values: Values, x: Scalar, v: Scalar, load: Scalar) -> Scalar:

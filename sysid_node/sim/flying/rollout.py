@@ -1,7 +1,7 @@
 """Simulated flights: the chain integrated over time by ``jax.lax.scan``.
 
 Within a step surfaces, thrust and gusts are linear in time, and the classical fourth-order Runge-Kutta rule integrates
-the body, the flow separation and the structural mode. Actuators, motor and lags are solved exactly from one sample to
+the body and the flow separation. Actuators, motor, lags and the structural mode are solved exactly from one sample to
 the next.
 """
 
@@ -19,9 +19,10 @@ from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import stall_separation
 from sysid_node.sim.model.chain import Chain, Drive, SensedMotion, derivative, drive_of
 from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar
-from sysid_node.sim.model.state import MODE_RATE, body_state
+from sysid_node.sim.model.state import body_state
 from sysid_node.sim.stations import actuator, airflow, clock, command, propulsion, sensors, structure
 from sysid_node.sim.stations.actuator import ActuatorState
+from sysid_node.sim.stations.structure import Vibration
 
 
 class RolloutInputs(NamedTuple):
@@ -51,7 +52,8 @@ Pilot = Callable[[Any, Scalar, Scalar], tuple[Scalar, Scalar, Any]]
 class StepState(NamedTuple):
     """What one step passes to the next."""
 
-    x: Scalar  # (16,) the continuous state
+    x: Scalar  # (14,) the continuous state
+    mode: Vibration  # of the structure, one sample before
     actuators: ActuatorState
     motor: Scalar  # thrust N
     motor_command: Scalar  # N
@@ -117,7 +119,8 @@ def advance(
     """
     h = chain.step
     k1, motion = derivative(chain, carry.x, carry.drive)
-    truth, probe, reading = _read(chain, carry, motion)
+    mode = structure.advance(chain.effects, carry.mode, motion.specific_force.z, h)
+    truth, probe, reading = _read(chain, carry, motion, mode)
     seen = sensors.noisy(chain.model, chain.effects, reading, noise)
     given, arriving, pilot_state = pilot(carry.pilot, seen, planned)
     actuators = actuator.advance(
@@ -129,7 +132,7 @@ def advance(
     x = _runge_kutta(chain, carry.x, k1, carry.drive, drive)
     moved = jnp.concatenate([surfaces, given])
     row = (reading, carry.x[:13], jnp.stack(motion.coefficients), moved)
-    return StepState(x, actuators, motor, motor_command, drive, truth, probe, pilot_state), row
+    return StepState(x, mode, actuators, motor, motor_command, drive, truth, probe, pilot_state), row
 
 
 #: Stages 2 to 4 of the classical rule: the time of each as a share of the step, and its weight.
@@ -137,7 +140,7 @@ _STAGES = ((0.5, 2.0), (0.5, 2.0), (1.0, 1.0))
 
 
 def _runge_kutta(chain: Chain, x: Scalar, k1: Scalar, now: Drive, then: Drive) -> Scalar:
-    """The state (16,) after one classical fourth-order step; k1 is the rate at (x, now).
+    """The state (14,) after one classical fourth-order step; k1 is the rate at (x, now).
 
     The drive is linear from ``now`` to ``then``. With a loop in place of four calls the compiled program is a third as
     large and not slower.
@@ -155,14 +158,14 @@ def _runge_kutta(chain: Chain, x: Scalar, k1: Scalar, now: Drive, then: Drive) -
     return x + h / 6.0 * total
 
 
-def _read(chain: Chain, carry: StepState, motion: SensedMotion) -> tuple[Scalar, Scalar, Scalar]:
+def _read(chain: Chain, carry: StepState, motion: SensedMotion, mode: Vibration) -> tuple[Scalar, Scalar, Scalar]:
     """The true air data (3,) at the probe, the same after its lag (3,), and all readings (12,) without noise."""
     state = body_state(carry.x)
     truth = _at_probe(chain, motion)
     probe = sensors.lagged(chain.effects, carry.probe, carry.truth, truth, chain.step)
     reading = jnp.stack(
         [
-            *_inertial(chain, state.rates, motion, carry.x[MODE_RATE]),
+            *_inertial(chain, state.rates, motion, mode),
             *euler_angles(state.attitude, jnp),
             *sensors.air_data(chain.effects, probe[0], probe[1], probe[2]),
         ]
@@ -170,11 +173,11 @@ def _read(chain: Chain, carry: StepState, motion: SensedMotion) -> tuple[Scalar,
     return truth, probe, reading
 
 
-def _inertial(chain: Chain, rates: Vector, motion: SensedMotion, mode_rate: Scalar) -> tuple[Scalar, ...]:
+def _inertial(chain: Chain, rates: Vector, motion: SensedMotion, mode: Vibration) -> tuple[Scalar, ...]:
     """Readings of accelerometers (m/s^2) and gyroscopes (rad/s)."""
     arm = sensors.imu_arm(chain.model, chain.effects, chain.body)
     force = specific_force_at(motion.specific_force, rates, motion.acceleration, arm)
-    shake, nod = structure.felt(chain.effects, motion.mode_acceleration, mode_rate)
+    shake, nod = structure.felt(chain.effects, structure.acceleration(chain.effects, mode), mode.speed)
     return (
         *sensors.accelerometers(chain.effects, force._replace(z=force.z + shake)),
         *sensors.gyroscopes(chain.effects, rates._replace(y=rates.y + nod)),
@@ -195,18 +198,17 @@ def begin(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_s
     x = settled(chain, initial, drive)
     _, motion = derivative(chain, x, drive)
     truth = _at_probe(chain, motion)
-    return StepState(x, actuators, motor, motor, drive, truth, truth, pilot_state), surfaces
+    mode = structure.start(chain.effects, motion.specific_force.z)
+    return StepState(x, mode, actuators, motor, motor, drive, truth, truth, pilot_state), surfaces
 
 
 def settled(chain: Chain, initial: Scalar, drive: Drive) -> Scalar:
-    """The continuous state (16,) of a body's state (13,), with flow separation and structural mode at rest."""
+    """The continuous state (14,) of a body's state (13,), with flow separation at rest."""
     state = body_state(initial)
     air = airflow.meet(state.velocity, state.rates, drive.gusts, jnp.ones_like(chain.altitude))
     zero = jnp.zeros_like(air.alpha)
     attached = stall_separation.attached(chain.effects["stall_separation"], air.alpha, zero, zero)
-    x = jnp.concatenate([initial, jnp.stack([attached, zero, zero])])
-    _, motion = derivative(chain, x, drive)
-    return x.at[13:].set(jnp.stack([attached, *structure.start(chain.effects, motion.specific_force.z)]))
+    return jnp.append(initial, attached)
 
 
 def _next(series: Scalar) -> Scalar:

@@ -17,8 +17,8 @@ from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.effects import stall_separation, steady_wind, unsteady_aerodynamics
 from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar, Values
 from sysid_node.sim.model.parameters import Parameters, unpack
-from sysid_node.sim.model.state import MODE, MODE_RATE, SEPARATION, body_state
-from sysid_node.sim.stations import actuator, aerodynamics, airflow, mass, propulsion, structure
+from sysid_node.sim.model.state import SEPARATION, body_state
+from sysid_node.sim.stations import actuator, aerodynamics, airflow, mass, propulsion
 from sysid_node.sim.stations.actuator import Servos
 from sysid_node.sim.stations.airflow import Air
 
@@ -82,12 +82,11 @@ class SensedMotion(NamedTuple):
     coefficients: Coefficients
     specific_force: Vector  # at the CG, m/s^2
     acceleration: Vector  # angular, rad/s^2
-    mode_acceleration: Scalar  # m/s^2
 
 
 @jax.jit
 def derivative(chain: Chain, x: Scalar, drive: Drive) -> tuple[Scalar, SensedMotion]:
-    """d/dt of the continuous state (16,), and the motion that the instruments measure."""
+    """d/dt of the continuous state (14,), and the motion that the instruments measure."""
     effects, state = chain.effects, body_state(x)
     altitude = -state.position.z
     air = airflow.meet(state.velocity, state.rates, drive.gusts, air_density(altitude, jnp))
@@ -96,7 +95,6 @@ def derivative(chain: Chain, x: Scalar, drive: Drive) -> tuple[Scalar, SensedMot
     alpha_rate = rate_of_alpha(chain, air, load.force.times(1.0 / chain.body.mass).plus(falling))
     load = unsteady_load(chain, air, load, alpha_rate)
     specific_force, acceleration = accelerations(chain.body, state.rates, load.force, load.moment)
-    mode_rate, mode_acceleration = structure.rate(effects, x[MODE], x[MODE_RATE], specific_force.z)
     over_ground = steady_wind.apply(effects["steady_wind"], to_earth(state.attitude, state.velocity))
     rates = (
         *over_ground,
@@ -104,10 +102,8 @@ def derivative(chain: Chain, x: Scalar, drive: Drive) -> tuple[Scalar, SensedMot
         *quaternion_rate(state.attitude, state.rates),
         *acceleration,
         separation_rate(chain, air, x[SEPARATION], alpha_rate),
-        mode_rate,
-        mode_acceleration,
     )
-    return jnp.stack(rates), SensedMotion(air, load.coefficients, specific_force, acceleration, mode_acceleration)
+    return jnp.stack(rates), SensedMotion(air, load.coefficients, specific_force, acceleration)
 
 
 def steady_load(chain: Chain, air: Air, drive: Drive, separation: Scalar, climb: Scalar) -> Load:

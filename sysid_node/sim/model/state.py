@@ -12,9 +12,8 @@ from sysid_node.sim.model.layout import Scalar
 #: attitude quaternion body to earth (scalar first), angular rates (rad/s, body axes).
 STATES = ("north", "east", "down", "u", "v", "w", "q0", "q1", "q2", "q3", "p", "q", "r")
 
-#: Indices of the other entries of the continuous state (16,): attached fraction of the flow, displacement (m) and speed
-#: (m/s) of the structural mode.
-SEPARATION, MODE, MODE_RATE = 13, 14, 15
+#: Index of the last entry of the continuous state (14,): attached fraction of the flow.
+SEPARATION = 13
 
 
 class BodyState(NamedTuple):

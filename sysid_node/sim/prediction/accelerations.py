@@ -27,6 +27,7 @@ from sysid_node.sim.prediction.structural_response import body_rates, mode_respo
 from sysid_node.sim.prediction.true_motion import TrueMotion, flow_at, true_motion
 from sysid_node.sim.signals.time_shift import shift_cubic
 from sysid_node.sim.stations import sensors, structure
+from sysid_node.sim.stations.structure import Vibration
 
 
 class Accelerations(NamedTuple):
@@ -103,7 +104,7 @@ def _vibrating_motion(chain: Chain, states: CarriedStates, motion: TrueMotion, f
 def _readings(chain: Chain, rates: Vector, force: Vector, acceleration: Vector, mode: Scalar) -> Accelerations:
     """What the instruments show of the motion, the vibration included."""
     effects, arm = chain.effects, sensors.imu_arm(chain.model, chain.effects, chain.body)
-    _, mode_acceleration = structure.rate(effects, mode[:, 0], mode[:, 1], force.z)
+    mode_acceleration = structure.acceleration(effects, Vibration(mode[:, 0], mode[:, 1], force.z))
     added_force, added_pitch = structure.felt(effects, mode_acceleration, mode_acceleration)
     at_imu = specific_force_at(force, rates, acceleration, arm)
     return Accelerations(

@@ -9,6 +9,7 @@ from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import Scalar
 from sysid_node.sim.stations import structure
+from sysid_node.sim.stations.structure import Vibration
 
 
 def mode_response(chain: Chain, load: Scalar) -> Scalar:
@@ -28,7 +29,8 @@ def mode_response(chain: Chain, load: Scalar) -> Scalar:
         return now, now
 
     loads = jnp.stack([jnp.concatenate([load[:1], load[:-1]]), load], 1)
-    _, mode = jax.lax.scan(advance, jnp.stack(structure.start(chain.effects, load[0])), loads)
+    rest = structure.start(chain.effects, load[0])
+    _, mode = jax.lax.scan(advance, jnp.stack([rest.displacement, rest.speed]), loads)
     return mode
 
 
@@ -43,19 +45,6 @@ def body_rates(chain: Chain, mode: Scalar, rates: Vector) -> Vector:
 
 
 def _advance(chain: Chain, mode: Scalar, load0: Scalar, load1: Scalar) -> Scalar:
-    """The mode (2,) one sample later under a force linear from ``load0`` to ``load1``, by Runge-Kutta as in a rollout.
-
-    A sample takes two steps: with one step at the diagnosis' rate the fastest mode within the bounds would be unstable.
-    """
-
-    def rate(y: Scalar, load: Scalar) -> Scalar:
-        return jnp.stack(structure.rate(chain.effects, y[0], y[1], load))
-
-    h, loads = 0.5 * chain.step, [load0 + share * (load1 - load0) for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
-    for before, middle, after in (loads[:3], loads[2:]):
-        k1 = rate(mode, before)
-        k2 = rate(mode + 0.5 * h * k1, middle)
-        k3 = rate(mode + 0.5 * h * k2, middle)
-        k4 = rate(mode + h * k3, after)
-        mode = mode + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-    return mode
+    """The mode (2,) one sample later under a force linear from ``load0`` to ``load1``."""
+    now = structure.advance(chain.effects, Vibration(mode[0], mode[1], load0), load1, chain.step)
+    return jnp.stack([now.displacement, now.speed])
