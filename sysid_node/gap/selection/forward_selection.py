@@ -22,7 +22,7 @@ from sysid_node.gap.instruments.overidentification import (
     pooled_overidentification,
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.selection.acceptance import is_accepted, predicts_better, relieves
+from sysid_node.gap.selection.acceptance import is_accepted, nats_by_tolerances, predicts_better, relieves
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress
 from sysid_node.gap.selection.causes import Cause, select_causes
 from sysid_node.gap.selection.comparison import Comparison, derivative_shift
@@ -63,6 +63,10 @@ class Attribution:
     def relieves_derivatives(self) -> bool:
         """Whether the derivatives are plausible together beside the causes, and much less so without them."""
         return relieves((derivative_shift(self.base.fit), derivative_shift(self.chosen.fit)), len(EFFECTS))
+
+    def strains_derivatives_more_than(self, larger: Attribution) -> bool:
+        """Whether the derivatives together are less plausible than beside the causes of another explanation."""
+        return nats_by_tolerances((derivative_shift(self.chosen.fit), derivative_shift(larger.chosen.fit))) > 0.0
 
     def as_in_file(self) -> Attribution:
         """The same with the aircraft file as the corrected fit: where fitted derivatives predict worse."""

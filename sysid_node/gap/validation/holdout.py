@@ -165,17 +165,19 @@ def _without_needless_causes(
 ) -> tuple[Attribution, Check]:
     """The explanation with the fewest causes that predicts at least as well by every measure, of these the best.
 
-    Only where the derivatives are the file's: fitted ones may move in a cause's place.
+    Only where no derivative moves in a cause's place: where all are the file's, or are no farther from it without it.
     """
-    if not attribution.keeps_file_derivatives or len(attribution.causes) < 2:
-        return attribution, checked
+    filed = attribution.keeps_file_derivatives
     fewer = []
-    for smaller in attribution.with_fewer_causes():
+    for smaller in attribution.with_fewer_causes() if len(attribution.causes) > 1 else ():
+        if not filed and smaller.strains_derivatives_more_than(attribution):
+            continue
         try:
-            found = validator(smaller.with_file_derivatives())
+            found = validator(smaller.with_file_derivatives() if filed else smaller)
             if is_needless(checked.gaps, found.gaps):
-                whole = _with_better_derivatives(smaller, validator(smaller), validator)
-                fewer.extend([whole] if whole[0].keeps_file_derivatives and _stands(*whole) else [])
+                whole = _with_better_derivatives(smaller, validator(smaller) if filed else found, validator)
+                kept = _stands(*whole) and whole[0].keeps_file_derivatives >= filed
+                fewer.extend([whole] if kept else [])
         except np.linalg.LinAlgError:
             continue
     return min(fewer, key=lambda each: (len(each[0].causes), each[1].gaps[-1].after), default=(attribution, checked))

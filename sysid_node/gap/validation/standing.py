@@ -72,8 +72,7 @@ def file_predicts_better(errors: Sequence[Errors], thresholds: Thresholds = THRE
 def is_needless(with_it: Sequence[Errors], without: Sequence[Errors]) -> bool:
     """Whether flight that was not fitted is predicted at least as well without a cause, by every measure.
 
-    Both have the file's derivatives, so that nothing has moved in the cause's place. What a cause explains of the
-    flights fitted, and of no other flight, is an error of the model there.
+    What a cause explains of the flights fitted, and of no other flight, is an error of the model there.
     """
     return all(less.after <= more.after for less, more in zip(without, with_it, strict=True))
 
