@@ -18,6 +18,9 @@ LATERAL = ("CY", "Cl", "Cn")
 #: Signals of motion in the plane of symmetry: those that a flight without lateral measurements has.
 LONGITUDINAL_SIGNALS = ("V", "alpha", "theta", "q", "ax", "az")
 
+#: Signals of motion out of it.
+LATERAL_SIGNALS = ("beta", "phi", "psi", "p", "r", "ay")
+
 #: Regressors that every aircraft has, and their meaning. The symbols of its controls are regressors, too.
 STATE_REGRESSORS = {
     "0": "offset, 1",

@@ -13,7 +13,7 @@ from math import log
 
 import numpy as np
 
-from sysid_node.aircraft.names import LATERAL
+from sysid_node.aircraft.names import LATERAL, LATERAL_SIGNALS
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, derivative_tolerances
 from sysid_node.gap.residuals.residual_model import ResidualModel
@@ -42,7 +42,7 @@ _FIXED = frozenset({"stall_separation.tau1", "structural_mode.damping", "actuato
 
 #: Parameters that motion in the plane of symmetry does not show. Where the lateral readings were not measured, they
 #: would stand for the motion that is not known: a bias of the yaw rate for the turn that a banked aircraft flies.
-_SIDEWAYS = frozenset({"ay", "p", "r", "beta", "y", "roll", "yaw", "Ixx", "Izz", "Ixz"})
+_SIDEWAYS = frozenset({*LATERAL_SIGNALS, "y", "roll", "yaw", "Ixx", "Izz", "Ixz"})
 
 #: Effects with a parameter that all controls share and one for each control. There is a candidate of the shared one,
 #: one of each control alone, and one of every control by itself; of the actuators' lag also one of second order.

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import DELAY_EFFECTS, Aircraft
-from sysid_node.aircraft.names import LATERAL
+from sysid_node.aircraft.names import LATERAL, LATERAL_SIGNALS
 from sysid_node.aircraft.reading.body import default_noise_bias
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array
@@ -150,7 +150,7 @@ def nuisances_of(
     sigma = {f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in LATERAL}
     believed = believed_effects(model.simulator)
     sigma |= believed
-    sigma |= {n: s for n, s in _biases(aircraft).items() if lateral or n.rpartition(".")[2] not in _SIDEWAYS}
+    sigma |= {n: s for n, s in _biases(aircraft).items() if lateral or n.rpartition(".")[2] not in LATERAL_SIGNALS}
     sigma |= {f"vane_bias.{angle}": THRESHOLDS.priors.inferred_angle for angle in model.flight.inferred}
     if any(is_gusty(m) for m in models):
         sigma["turbulence.rotation"] = THRESHOLDS.priors.rotation
@@ -213,6 +213,3 @@ def _room(simulator: Simulator, names: Iterable[str]) -> dict[str, float]:
     values, indices = simulator.neutral(), {name: simulator.names.index(name) for name in names}
     table = {name: simulator.parameters[i][1] for name, i in indices.items()}
     return {n: float(min(p.upper - values[indices[n]], values[indices[n]] - p.lower)) for n, p in table.items()}
-
-
-_SIDEWAYS = frozenset({"ay", "p", "r", "beta"})

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.names import LATERAL
+from sysid_node.aircraft.names import LATERAL, LATERAL_SIGNALS
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
@@ -20,7 +20,7 @@ from sysid_node.gap.thresholds import THRESHOLDS
 #: Names of the two motions in gap.json.
 MOTIONS = IN_PLANE, SIDEWAYS = "longitudinal", "lateral"
 
-_SIDEWAYS = frozenset({*LATERAL, "ay", "p", "r", "beta", "phi", "psi"})
+_SIDEWAYS = frozenset({*LATERAL, *LATERAL_SIGNALS})
 
 
 def excited_motions(models: Sequence[ResidualModel]) -> frozenset[str]:
