@@ -59,12 +59,12 @@ def main() -> None:
     args = parser.parse_args()
     for commands in COMMANDS:
         if args.commands in (None, commands):
-            rows = [_row(args.out, commands, log) for log in LOGS if log.startswith(_LOGS)]
+            rows = [row_of(args.out, commands, log) for log in LOGS if log.startswith(_LOGS)]
             heads = ("log", "named", "size right", "also blamed", "with nothing wrong", "not named, or wrong in size")
             publish(f"bench/gap/log_rates.py {commands}", table(heads, rows), args.page)
 
 
-def _row(out: Path, commands: str, log: str) -> tuple[str, ...]:
+def row_of(out: Path, commands: str, log: str) -> tuple[str, ...]:
     """What is right of the diagnoses of one log's flights."""
     pairs = [(effect, _judged(_diagnosed(out, commands, log, effect), effect)) for effect in EFFECTS]
     spiked = [(effect, case) for effect, case in pairs if effect]
