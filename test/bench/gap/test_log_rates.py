@@ -3,9 +3,9 @@
 import json
 
 import pytest
+
 from bench.estimation.log_rates import LOGS
 from bench.gap import log_rates
-
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.sim import Simulator
 
