@@ -45,7 +45,7 @@ COMMANDS: Mapping[str, tuple[str, ...]] = {
 }
 
 #: Logs of ``bench.estimation.log_rates``, by the beginnings of their names.
-_LOGS = ("all at full rate", "commands 50 Hz", "commands 25 Hz", "commands 20 Hz", "commands 10 Hz")
+_LOGS = ("all at full rate", "commands 50 Hz", "commands 25 Hz")
 _AIRCRAFT = "cdrw"
 _FIRST = 31  # seed
 
