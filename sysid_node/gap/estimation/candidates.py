@@ -24,11 +24,8 @@ from sysid_node.sim import EFFECTS, Simulator
 UNOBSERVABLE = frozenset({"steady_wind", "turbulence", "gust", "sensor_noise"})
 
 #: Effects that a flight without vanes cannot show: those of the air data, and the delay of the IMU, from which all but
-#: the airspeed comes then, so that it cannot be told from a delay of the commands (``selection.causes``). Nor can a
-#: rise of the drag be told from an angle of attack that was inferred wrongly, by which lift passes for drag.
-_OF_VANES = frozenset(
-    {"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay", "imu_delay", "drag_rise"}
-)
+#: the airspeed comes then, so that it cannot be told from a delay of the commands (``selection.causes``).
+_OF_VANES = frozenset({"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay", "imu_delay"})
 
 #: Effects of propulsion, which a flight without measured thrust cannot show.
 _OF_THRUST = frozenset(name for name, effect in EFFECTS.items() if effect.station == "propulsion")

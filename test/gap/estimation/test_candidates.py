@@ -101,11 +101,3 @@ def test_what_was_not_measured_is_not_blamed(plain_model) -> None:
     flight = replace(plain_model.flight, metered=False)
     effects = {c.effect for c in candidates_of(plain_model.simulator, [replace(plain_model, flight=flight)])}
     assert not effects & {name for name, effect in EFFECTS.items() if effect.station == "propulsion"}
-
-
-def test_without_vanes_neither_they_nor_the_drag_are_blamed(plain_model) -> None:
-    """An angle of attack that was inferred wrongly makes drag of lift."""
-    flight = replace(plain_model.flight, inferred=("alpha", "beta"))
-    effects = {c.effect for c in candidates_of(plain_model.simulator, [replace(plain_model, flight=flight)])}
-    assert not effects & {"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay", "drag_rise"}
-    assert {"airspeed_scale", "imu_bias", "thrust_scale", "actuator_lag"} <= effects
