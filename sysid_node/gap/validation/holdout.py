@@ -142,8 +142,8 @@ def standing_explanation(attribution: Attribution, validator: Validator) -> tupl
 
     In this order: all causes; the same with the sizes of least squares; without one of the causes, without two; no
     cause. Each is also tried with the file's own derivatives, and kept so where these predict better. An explanation
-    whose predictions are not finite is passed over. What stands is left without the causes that are needless there, and its
-    insignificant sizes are held at the file's values where that predicts no worse.
+    whose predictions are not finite is passed over. What stands is left without the causes that are needless there,
+    and its insignificant sizes are held at the file's values where that predicts no worse.
     """
     for explanation in _explanations(attribution):
         try:
