@@ -64,8 +64,11 @@ class Attribution:
         """Whether the derivatives are plausible together beside the causes, and much less so without them."""
         return relieves((derivative_shift(self.base.fit), derivative_shift(self.chosen.fit)), len(EFFECTS))
 
-    def strains_derivatives_more_than(self, larger: Attribution) -> bool:
-        """Whether the derivatives together are less plausible than beside the causes of another explanation."""
+    def has_less_plausible_derivatives_than(self, larger: Attribution) -> bool:
+        """Whether the derivatives together are less plausible than beside the causes of a larger explanation.
+
+        They are not where they are implausible beside these, too.
+        """
         return nats_by_tolerances((derivative_shift(self.chosen.fit), derivative_shift(larger.chosen.fit))) > 0.0
 
     def as_in_file(self) -> Attribution:

@@ -171,14 +171,14 @@ def _without_needless_causes(
     filed = attribution.keeps_file_derivatives
     fewer = []
     for smaller in attribution.with_fewer_causes() if len(attribution.causes) > 1 else ():
-        if not filed and smaller.strains_derivatives_more_than(attribution):
+        if not filed and smaller.has_less_plausible_derivatives_than(attribution):
             continue
         try:
             found = validator(smaller.with_file_derivatives() if filed else smaller)
             if is_needless(checked.gaps, found.gaps):
                 whole = _with_better_derivatives(smaller, validator(smaller) if filed else found, validator)
-                kept = _stands(*whole) and whole[0].keeps_file_derivatives >= filed
-                fewer.extend([whole] if kept else [])
+                as_before = whole[0].keeps_file_derivatives or not filed
+                fewer.extend([whole] if as_before and _stands(*whole) else [])
         except np.linalg.LinAlgError:
             continue
     return min(fewer, key=lambda each: (len(each[0].causes), each[1].gaps[-1].after), default=(attribution, checked))

@@ -32,7 +32,7 @@ class Explanation:
     def with_fewer_causes(self) -> Iterator["Explanation"]:
         return (Explanation(size * np.eye(2), strained=self.strained) for size in self.smaller)
 
-    def strains_derivatives_more_than(self, larger: "Explanation") -> bool:
+    def has_less_plausible_derivatives_than(self, larger: "Explanation") -> bool:
         return self.strained
 
     def with_file_derivatives(self) -> "Explanation":
