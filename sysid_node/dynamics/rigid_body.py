@@ -12,7 +12,8 @@ from typing import NamedTuple, Protocol
 
 from sysid_node.aircraft.model import Inertia
 from sysid_node.dynamics.atmosphere import GRAVITY
-from sysid_node.dynamics.vector import Real, Triple, Vector
+from sysid_node.dynamics.attitude import down_of_euler, euler_rates
+from sysid_node.dynamics.vector import Namespace, Real, Triple, Vector
 
 
 class MomentsOfInertia(Protocol):
@@ -92,6 +93,17 @@ def free_fall(down: Vector, rates: Vector, velocity: Triple) -> Vector:
 def velocity_rate(force: Vector, down: Vector, rates: Vector, velocity: Triple) -> Vector:
     """Rate of the velocity's components (m/s^2, body axes) under a specific force (m/s^2): dv/dt = f + g - w x v."""
     return force.plus(free_fall(down, rates, velocity))
+
+
+def kinematic_rates(
+    velocity: Triple, attitude: Vector, force: Vector, rates: Vector, xp: Namespace
+) -> tuple[Vector, Vector]:
+    """Rates of the velocity's components (m/s^2) and of the Euler angles (rad/s) by specific force and angular rates.
+
+    Klein & Morelli (2006), "Aircraft System Identification", ch. 3 and 10.
+    """
+    down = down_of_euler(attitude.x, attitude.y, xp)
+    return velocity_rate(force, down, rates, velocity), euler_rates(attitude.x, attitude.y, rates, xp)
 
 
 def accelerations(body: MassProperties, rates: Vector, force: Vector, moment: Vector) -> tuple[Vector, Vector]:

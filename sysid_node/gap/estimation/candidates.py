@@ -16,7 +16,7 @@ import numpy as np
 from sysid_node.aircraft.names import LATERAL, LATERAL_SIGNALS
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, derivative_tolerances
-from sysid_node.gap.residuals.residual_model import ResidualModel
+from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS, Simulator
 
@@ -26,6 +26,9 @@ UNOBSERVABLE = frozenset({"steady_wind", "turbulence", "gust", "sensor_noise"})
 #: Effects that a flight without vanes cannot show: those of the air data, and the delay of the IMU, from which all but
 #: the airspeed comes then, so that it cannot be told from a delay of the commands (``selection.causes``).
 _OF_VANES = frozenset({"vane_bias", "vane_scale", "vane_lever_arm", "air_data_lag", "air_data_delay", "imu_delay"})
+
+#: Effects of the drag alone, which is not compared where gusts turn the lift by angles that no vane measures.
+_OF_DRAG = frozenset({"drag_rise"})
 
 #: Effects of propulsion, which a flight without measured thrust cannot show.
 _OF_THRUST = frozenset(name for name, effect in EFFECTS.items() if effect.station == "propulsion")
@@ -108,6 +111,7 @@ def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list
     found: list[Candidate] = []
     length = max(model.windows.starts[-1] + model.windows.length for model in models)
     unseen = UNOBSERVABLE | (_OF_VANES if any(model.flight.inferred for model in models) else frozenset())
+    unseen |= frozenset() if all(model.axes[CHANNELS.index("CD")] for model in models) else _OF_DRAG
     unseen |= frozenset() if all(model.flight.metered for model in models) else _OF_THRUST
     unseen |= _OF_GROUND - frozenset(simulator.aircraft.effects)
     band = min(model.windows.highest for model in models)

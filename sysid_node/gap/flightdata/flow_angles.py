@@ -3,12 +3,13 @@
 They come from the online estimator's kinematic filter (``online.alignment.flow_angle_filter``): integrals of the IMU,
 corrected slowly by the lift and side force of the aircraft file. So they share the IMU's clock and errors, do not
 contain gusts, and are no measurements that could be compared. Their mean is that of the aircraft file; its error, by
-which lift is mistaken for drag, is a nuisance parameter.
+which lift is mistaken for drag, is a nuisance parameter. How the filter was corrected is kept, so that the angles can
+follow other errors of the instruments (``residuals.inferred_flow``).
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,12 +17,29 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.alignment import flow_angle_filter
+from sysid_node.online.alignment.flow_angle_equations import velocity_at_cg
+from sysid_node.online.alignment.flow_angle_filter import FlowAngleFilter
+from sysid_node.online.alignment.flow_angle_model import FlowAngleModel
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 ANGLES = ("alpha", "beta")
 
+#: Entries of the filter's state: the velocity (m/s) along body axes, roll and pitch angle (rad), biases of p, q and az.
+STATES = 8
+
 _NEEDED = ("ax", "ay", "az", "p", "q", "r", "V", "rho")
 _LONGEST_STEP = 0.5  # s
+
+
+@dataclass(frozen=True)
+class FilterHistory:
+    """When and how the filter of a flight was begun and corrected, and the angles (rad) that it gave."""
+
+    angles: dict[str, Array]  # (N,) each
+    corrected: Array  # (M,) s
+    gains: Array  # (M, 8, 3) of the mean differences of airspeed (m/s), alpha and beta (rad) since the last correction
+    begun: Array  # (B,) s
+    starts: Array  # (B, 8) states, the velocity that of the CG
 
 
 def missing_flow_angles(record: FlightRecord) -> tuple[str, ...]:
@@ -29,10 +47,10 @@ def missing_flow_angles(record: FlightRecord) -> tuple[str, ...]:
     return tuple(name for name in ANGLES if not record.measured(name))
 
 
-def with_inferred_angles(
+def inferred_angles(
     aircraft: Aircraft, record: FlightRecord, angles: tuple[str, ...], source: str
-) -> FlightRecord:
-    """The record with these angles (rad) inferred. Raises InputError where they cannot be."""
+) -> tuple[FlightRecord, FilterHistory]:
+    """The record with these angles (rad) inferred, and how. Raises InputError where they cannot be."""
     absent = [name for name in _NEEDED if not np.isfinite(record[name]).all()]
     if absent:
         raise InputError(f"{source}: no {' or '.join(angles)}, and no complete {', '.join(absent)} to infer them from")
@@ -41,10 +59,33 @@ def with_inferred_angles(
         raise InputError(
             f"{source}: no {' or '.join(angles)}; they can be inferred where the aircraft file has CL_alpha and CY_beta"
         )
-    samples = _samples(aircraft, record, angles)
-    filled = flow_angle_filter.complete_many(filter_, record.time, samples, _LONGEST_STEP)
-    columns = {name: filled[:, SAMPLE_COLUMNS.index(name)] for name in angles}
-    return replace(record, columns={**record.columns, **columns})
+    history = _filtered(filter_, filter_.model, record.time, _samples(aircraft, record, angles), angles)
+    return replace(record, columns={**record.columns, **history.angles}), history
+
+
+def _filtered(
+    filter_: FlowAngleFilter, model: FlowAngleModel, time: Array, samples: Array, angles: tuple[str, ...]
+) -> FilterHistory:
+    """What the filter makes of samples (N, M) at ``time`` (N,) s."""
+    filled, corrected, gains, begun, starts = [], [], [], [], []
+    for now, sample in zip(time.tolist(), samples.tolist(), strict=True):
+        filled.append(flow_angle_filter.complete(filter_, now, sample, _LONGEST_STEP))
+        if filter_.innovations.since != now:
+            continue
+        if filter_.gain.size:
+            corrected.append(now)
+            gains.append(filter_.gain)
+        else:
+            begun.append(now)
+            starts.append([*velocity_at_cg(filter_.state, model, sample), *filter_.state[3:]])
+    columns = np.array(filled)
+    return FilterHistory(
+        {name: columns[:, SAMPLE_COLUMNS.index(name)] for name in angles},
+        np.array(corrected),
+        np.array(gains).reshape(-1, STATES, 3),
+        np.array(begun),
+        np.array(starts).reshape(-1, STATES),
+    )
 
 
 def _samples(aircraft: Aircraft, record: FlightRecord, angles: tuple[str, ...]) -> Array:

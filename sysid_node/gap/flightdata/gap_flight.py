@@ -18,7 +18,7 @@ from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs.opening import is_table, open_streams
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import Streams
-from sysid_node.gap.flightdata import flow_angles as inferred
+from sysid_node.gap.flightdata.flow_angles import FilterHistory, inferred_angles, missing_flow_angles
 from sysid_node.gap.flightdata.thrust import thrust_missing, with_inferred_thrust
 from sysid_node.sim.prediction.signals import unfiltered_columns
 from sysid_node.sim.signals.low_pass import gaussian_taps, low_passed
@@ -49,6 +49,7 @@ class GapFlight:
     source: str = ""
     filled: tuple[str, ...] = field(default=())  # columns that were not measured and are taken as zero
     inferred: tuple[str, ...] = field(default=())  # flow angles that no vane measured
+    history: FilterHistory | None = None  # how they were inferred
     left_out: float = 0.0  # s without a manoeuvre that were cut off
     metered: bool = True  # whether thrust was measured; else it is inferred from the file's drag
     command_interval: float = 0.0
@@ -119,22 +120,25 @@ def _with_thrust(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
 
 def _with_flow_angles(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     """The flight with inferred flow angles, where no vane measured them and the inertial measurements are complete."""
-    angles = inferred.missing_flow_angles(flight.record)
+    angles = missing_flow_angles(flight.record)
     if not angles or not all(np.isfinite(flight.record[name]).all() for name in ("ay", "p", "r")):
         return flight
-    return replace(
-        flight, record=inferred.with_inferred_angles(aircraft, flight.record, angles, flight.source), inferred=angles
-    )
+    return _inferred(aircraft, replace(flight, inferred=angles))
+
+
+def _inferred(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
+    """The flight with its missing flow angles inferred."""
+    record, history = inferred_angles(aircraft, flight.record, flight.inferred, flight.source)
+    return replace(flight, record=record, history=history)
 
 
 def inferred_again(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     """The flight with its flow angles and thrust inferred anew where nobody measured them."""
-    record = flight.record
     if flight.inferred:
-        record = inferred.with_inferred_angles(aircraft, record, flight.inferred, flight.source)
-    if not flight.metered:
-        record = with_inferred_thrust(aircraft, record)
-    return replace(flight, record=record)
+        flight = _inferred(aircraft, flight)
+    if flight.metered:
+        return flight
+    return replace(flight, record=with_inferred_thrust(aircraft, flight.record))
 
 
 def _first_run(record: FlightRecord) -> FlightRecord:

@@ -14,6 +14,7 @@ from sysid_node.aircraft.names import LONGITUDINAL, LONGITUDINAL_SIGNALS
 from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flightdata import thrust
+from sysid_node.gap.flightdata.flow_angles import FilterHistory
 from sysid_node.gap.flightdata.gap_flight import GapFlight, resampled
 from sysid_node.gap.flightdata.time_scales import highest_frequency
 from sysid_node.gap.residuals.air_motion import (
@@ -24,6 +25,7 @@ from sysid_node.gap.residuals.air_motion import (
     observer_memory,
 )
 from sysid_node.gap.residuals.flight_path_reconstruction import READINGS, motion_of
+from sysid_node.gap.residuals.inferred_flow import filter_steps
 from sysid_node.gap.residuals.noise_gain import NoiseGain, gain_from, noisy_parameters
 from sysid_node.gap.residuals.predictions import CHANNELS, ObserverMemory, PredictionInputs
 from sysid_node.gap.residuals.residual_model import Measurement, ResidualModel, joined
@@ -80,7 +82,8 @@ def residual_model_of(
     if memory == LONGEST_MEMORY:
         return calm
     followed = ObserverMemory(memory, 0.0 if is_gusty(calm) else LONGEST_MEMORY)
-    shorter = noiseless_model(simulator, flight, record, windows, axes, followed)
+    shown = _without_drag(axes) if "alpha" in flight.inferred and is_gusty(calm) else axes
+    shorter = noiseless_model(simulator, flight, record, windows, shown, followed)
     known = _with_measured_noise(replace(shorter, gusts=calm.gusts, instruments=instruments), seed)
     return replace(known, gain=_noise_gain(known, seed)) if followed.vane == 0.0 else known
 
@@ -100,7 +103,7 @@ def noiseless_model(
     memory: ObserverMemory,
 ) -> ResidualModel:
     """The residual model of a record whose sensors' noise is not known: its power is one."""
-    inputs, series = _inputs(simulator, record, memory, axes[_VANES])
+    inputs, series = _inputs(simulator, flight.history, record, memory, axes[_VANES])
     measurement = Measurement(record, windows, series, windows.transform(series), axes)
     return ResidualModel(simulator, flight, measurement, inputs, np.ones((1, len(CHANNELS))))
 
@@ -113,6 +116,11 @@ def _measured_channels(flight: GapFlight, record: FlightRecord) -> NDArray[np.bo
     axes[[CHANNELS.index(name) for name in flight.inferred]] = False
     axes[CHANNELS.index(thrust.THRUST_CHANNEL)] &= flight.metered
     return axes
+
+
+def _without_drag(axes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which channels (12,) are compared where gusts turn the lift by angles that no vane measures."""
+    return axes & (np.array(CHANNELS) != "CD")
 
 
 def _with_measured_noise(model: ResidualModel, seed: int) -> ResidualModel:
@@ -153,7 +161,11 @@ def _residual_and_slopes(model: ResidualModel, indices: NDArray[np.intp]) -> Com
 
 
 def _inputs(
-    simulator: Simulator, record: FlightRecord, memory: ObserverMemory, vanes: NDArray[np.bool_]
+    simulator: Simulator,
+    history: FilterHistory | None,
+    record: FlightRecord,
+    memory: ObserverMemory,
+    vanes: NDArray[np.bool_],
 ) -> tuple[PredictionInputs, Array]:
     """What predictions take from a record, padded, and the measured channels (N, 12); ``vanes`` (2,) were measured."""
     signals, missing = signals_of(simulator, record), padded_length(len(record)) - len(record)
@@ -163,6 +175,10 @@ def _inputs(
     forces = joined(_measured_coefficients(simulator.model, signals, Accelerations(*accelerations)), len(record))
     empty = jnp.zeros((len(record) + missing, len(READINGS)))
     read = empty if motion is None else jnp.hstack([motion.air, motion.attitude])
+    if history is not None and motion is not None:
+        length = len(record) + missing
+        steps = filter_steps(simulator.aircraft, history, record, simulator.rate, length)
+        motion = motion._replace(inference=steps)
     memories, measured = jax.tree.map(jnp.asarray, memory), jnp.asarray(vanes, float)
     inputs = PredictionInputs(signals, motion, memories, measured, jnp.asarray(simulator.step))
     return inputs, np.concatenate([forces, np.asarray(read)[: len(record)]], axis=1)

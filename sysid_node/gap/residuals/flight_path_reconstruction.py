@@ -19,11 +19,11 @@ import numpy as np
 from jax import export
 
 from sysid_node.dynamics.airflow import flow_angles, flow_rates, velocity_of
-from sysid_node.dynamics.attitude import down_of_euler, euler_rates
 from sysid_node.dynamics.lever_arm import specific_force_from, velocity_at, velocity_from
-from sysid_node.dynamics.rigid_body import velocity_rate
+from sysid_node.dynamics.rigid_body import kinematic_rates
 from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import FlightRecord
+from sysid_node.gap.residuals.inferred_flow import FilterSteps, inferred_velocity
 from sysid_node.sim.effects import air_data_lag, imu_misalignment
 from sysid_node.sim.effects.actuator_lag import first_order_series
 from sysid_node.sim.model.chain import Chain
@@ -52,6 +52,7 @@ class InstrumentReadings(NamedTuple):
     turning: Scalar  # (N, 3) rad/s^2
     air: Scalar  # (N, 3) V m/s, alpha, beta rad
     attitude: Scalar  # (N, 3) phi, theta, psi rad, without jumps
+    inference: FilterSteps | None = None  # how flow angles that no vane measured are inferred
 
 
 class _Inertial(NamedTuple):
@@ -137,6 +138,11 @@ def corrected_motion(chain: Chain, motion: InstrumentReadings) -> Sample:
     inertial, reading = _inertial(chain, motion), _reading(chain, motion)
     flow = sensors.before_lag(chain.effects, reading, _flow_rate(chain, inertial, reading), chain.step)
     velocity = Vector(*velocity_from(velocity_of(flow.T, jnp), inertial.rates, _probe(chain)))
+    if motion.inference is not None:
+        bias = chain.effects["vane_bias"]["alpha"], chain.effects["vane_bias"]["beta"]
+        velocity = inferred_velocity(motion.inference, inertial.force, inertial.rates, velocity, bias)
+        flow = _at_probe(chain, velocity, inertial.rates)
+        reading = jnp.where(jnp.append(0.0, motion.inference.inferred) > 0.0, flow, reading)
     return Sample(inertial.force, inertial.rates, velocity, inertial.attitude, flow, reading)
 
 
@@ -161,7 +167,7 @@ def flow_of(chain: Chain, motion: InstrumentReadings, memory: Scalar | float, va
     samples = corrected_motion(chain, motion)
 
     def followed() -> Flow:
-        moving, _ = rates_of_change(samples.velocity, samples.attitude, samples.force, samples.rates)
+        moving, _ = kinematic_rates(samples.velocity, samples.attitude, samples.force, samples.rates, jnp)
         velocity, rate = _followed(samples.velocity, moving, memory, chain.step)
         _, alpha_rate, _ = flow_rates(velocity, rate, jnp)
         still = jnp.zeros_like(alpha_rate)
@@ -192,7 +198,7 @@ def _air_rotation(chain: Chain, samples: Sample, velocity: Vector, vanes: Scalar
     turbulence, and its span smooths them (MIL-F-8785C (1980), q_g and r_g of the Dryden form).
     Nothing shows rolling gusts.
     """
-    moving, _ = rates_of_change(velocity, samples.attitude, samples.force, samples.rates)
+    moving, _ = kinematic_rates(velocity, samples.attitude, samples.force, samples.rates, jnp)
     _, *by_motion = flow_rates(velocity, moving, jnp)
     speed, *angles = flow_angles(velocity, jnp)
     unexplained = [slope(angle, chain.step) - rate for angle, rate in zip(angles, by_motion, strict=True)]
@@ -233,7 +239,7 @@ def _flow_rate(chain: Chain, inertial: _Inertial, reading: Scalar) -> Scalar:
     """Rates of change (N, 3) of airspeed and flow angles at the probe."""
     force, rates, turning, attitude = inertial
     velocity, probe = velocity_of(reading.T, jnp), _probe(chain)
-    moving, _ = rates_of_change(Vector(*velocity_from(velocity, rates, probe)), attitude, force, rates)
+    moving, _ = kinematic_rates(Vector(*velocity_from(velocity, rates, probe)), attitude, force, rates, jnp)
     return jnp.stack(flow_rates(velocity, velocity_at(moving, turning, probe), jnp), axis=1)
 
 
@@ -277,9 +283,9 @@ def _advance(
     Memories (s) grow from zero with the flight: otherwise the first reading's noise would stay for as long.
     """
     h = chain.step
-    k1 = rates_of_change(state.velocity, state.attitude, before.force, before.rates)
+    k1 = kinematic_rates(state.velocity, state.attitude, before.force, before.rates, jnp)
     middle = (state.velocity.plus(k1[0].times(h)), state.attitude.plus(k1[1].times(h)))
-    k2 = rates_of_change(*middle, now.force, now.rates)
+    k2 = kinematic_rates(*middle, now.force, now.rates, jnp)
     velocity = state.velocity.plus(k1[0].plus(k2[0]).times(0.5 * h))
     attitude = state.attitude.plus(k1[1].plus(k2[1]).times(0.5 * h))
     truth = _at_probe(chain, velocity, now.rates)
@@ -290,12 +296,6 @@ def _advance(
     return _State(velocity, attitude, probe, truth), reading
 
 
-def rates_of_change(velocity: Vector, attitude: Vector, force: Vector, rates: Vector) -> tuple[Vector, Vector]:
-    """Rates of the velocity's components (m/s^2) and of the Euler angles (rad/s)."""
-    down = down_of_euler(attitude.x, attitude.y, jnp)
-    return velocity_rate(force, down, rates, velocity), euler_rates(attitude.x, attitude.y, rates, jnp)
-
-
 def _at_probe(chain: Chain, velocity: Vector, rates: Vector) -> Scalar:
-    """Airspeed, alpha and beta (3,) at the probe."""
-    return jnp.stack(sensors.at_probe(velocity, rates, _probe(chain)))
+    """Airspeed, alpha and beta (..., 3) at the probe."""
+    return jnp.stack(sensors.at_probe(velocity, rates, _probe(chain)), axis=-1)

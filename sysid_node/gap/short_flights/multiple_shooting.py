@@ -18,13 +18,13 @@ import numpy as np
 
 from sysid_node.dynamics.atmosphere import altitude_of
 from sysid_node.dynamics.attitude import quaternion
+from sysid_node.dynamics.rigid_body import kinematic_rates
 from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.flight_path_reconstruction import (
     InstrumentReadings,
     Sample,
     corrected_motion,
-    rates_of_change,
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim.flying.rollout import Pilot, StepState, advance, begin
@@ -122,8 +122,8 @@ def _air(samples: Sample, begins: Scalar, step: Scalar) -> Scalar:
 
     def integrate(held: Scalar, new: tuple[Sample, Sample, Scalar]) -> tuple[Scalar, Scalar]:
         before, now, anew = new
-        k1, _ = rates_of_change(Vector(*held), before.attitude, before.force, before.rates)
-        k2, _ = rates_of_change(Vector(*held).plus(k1.times(step)), now.attitude, now.force, now.rates)
+        k1, _ = kinematic_rates(Vector(*held), before.attitude, before.force, before.rates, jnp)
+        k2, _ = kinematic_rates(Vector(*held).plus(k1.times(step)), now.attitude, now.force, now.rates, jnp)
         ahead = held + 0.5 * step * jnp.stack(k1.plus(k2))
         moved = jnp.where(anew, jnp.stack(now.velocity), ahead)
         return moved, moved

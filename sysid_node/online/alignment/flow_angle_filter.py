@@ -108,6 +108,7 @@ class FlowAngleFilter:
     covariance: Array = field(default_factory=lambda: np.empty((0, 0)))
     imu: Sequence[float] = ()  # the last reading
     innovations: Innovations = field(default_factory=Innovations)
+    gain: Array = field(default_factory=lambda: np.empty((0, 0)))  # (8, 3) of the last correction; empty before it
     band: BandEnergies = field(default_factory=BandEnergies)
 
     @property
@@ -218,7 +219,7 @@ def _begin(filter_: FlowAngleFilter, model: FlowAngleModel, time: float, sample:
     ]
     spread = [1.0, _FLOW * V, _FLOW * V, _ATTITUDE, _ATTITUDE, _BIAS, _BIAS, model.bias_az]
     filter_.covariance = np.diag(np.square(spread))
-    filter_.innovations = Innovations(time)
+    filter_.innovations, filter_.gain = Innovations(time), np.empty((0, 0))
 
 
 def _sane(state: Sequence[float]) -> bool:
@@ -260,6 +261,6 @@ def _correct(filter_: FlowAngleFilter, model: FlowAngleModel, time: float, air_i
     gains = (gain[2, 1] / (V * span)) ** 2, (gain[1, 2] / (V * span)) ** 2, 1.0
     kept = np.eye(8) - gain @ H
     filter_.covariance = kept @ P @ kept.T + (gain * R) @ gain.T  # Joseph's form
-    filter_.innovations = Innovations(time)
+    filter_.innovations, filter_.gain = Innovations(time), gain
     noise = model.airspeed_noise**2 * air_interval / (span * V * V)
     filter_.band.add(time, span, (mean[0] / V, math.atan2(w, u), math.asin(v / V)), noise, gains)
