@@ -120,7 +120,7 @@ def _measured_channels(flight: GapFlight, record: FlightRecord) -> NDArray[np.bo
 
 def _without_drag(axes: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which channels (12,) are compared where gusts turn the lift by angles that no vane measures."""
-    return axes & (np.array(CHANNELS) != "CD")
+    return np.asarray(axes & (np.array(CHANNELS) != "CD"))
 
 
 def _with_measured_noise(model: ResidualModel, seed: int) -> ResidualModel:

@@ -65,8 +65,9 @@ def filter_steps(
     series = (2.0 * model.mass_over_area / record["rho"], *_known_parts(model, aircraft, record))
     scale, lift, side = (jnp.asarray(np.pad(part, (0, missing), mode="edge")) for part in series)
     slopes, inferred = np.array([model.lift.slope, model.side.slope]), np.isin(ANGLES, list(history.angles))
-    parts = (interval, gains, corrects, starts, begins)
-    return FilterSteps(*map(jnp.asarray, parts), scale, lift, side, jnp.asarray(slopes), jnp.asarray(inferred, float))
+    of_filter = [jnp.asarray(part) for part in (interval, gains, corrects, starts, begins)]
+    of_file = [scale, lift, side, jnp.asarray(slopes), jnp.asarray(inferred, float)]
+    return FilterSteps(*of_filter, *of_file)
 
 
 def inferred_velocity(
@@ -105,17 +106,18 @@ def _filtered(steps: FilterSteps, force: Vector, rates: Vector, speed: Scalar) -
 
     first = (steps.starts[0], jnp.zeros(4))
     _, velocity = jax.lax.scan(advance, first, (before, imu, references, *per_sample))
-    return Vector(*velocity.T)
+    u, v, w = velocity.T
+    return Vector(u, v, w)
 
 
 def _integrated(state: Scalar, interval: Scalar, last: Scalar, now: Scalar) -> Scalar:
     """The state (8,) one sample later, by Heun's rule between two readings (6,) of specific force and rates."""
 
     def rate(at: Scalar, reading: Scalar) -> Scalar:
-        p, q, az = at[_BIASES]
+        (roll, pitch), (p, q, az) = at[_ATTITUDE], at[_BIASES]
         force = Vector(reading[0], reading[1], reading[2] - az)
         rates = Vector(reading[3] - p, reading[4] - q, reading[5])
-        attitude = Vector(*at[_ATTITUDE], 0.0)
+        attitude = Vector(roll, pitch, jnp.zeros(()))
         velocity, turning = kinematic_rates(Vector(*at[_VELOCITY]), attitude, force, rates, jnp)
         return jnp.stack([*velocity, turning.x, turning.y, *jnp.zeros(3)])
 

@@ -23,6 +23,8 @@ from sysid_node.gap.validation.kfold import kfold_evidence
 from sysid_node.gap.validation.simulation_error import simulation_gap, weather_suffices
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.validation.standing import (
+    ErrorTable,
+    attitude_errors,
     causes_exceed_weather,
     causes_stand,
     file_derivatives_suit_causes,
@@ -60,6 +62,11 @@ class Check:
     def gaps(self) -> list[Gap]:
         """The gap by each measure: by frequency, then of short simulated flights where there are any."""
         return [self.gap, *([self.simulation_gap] if self.simulation_gap else [])]
+
+    @property
+    def attitude(self) -> dict[str, ErrorTable]:
+        """The errors of the attitude by the gyroscopes, by channel."""
+        return attitude_errors(self.gap.per_channel)
 
     @cached_property
     def corrected(self) -> Evidence:
@@ -126,7 +133,9 @@ def validate(
     with ThreadPoolExecutor(1) as pool:
         weather = pool.submit(weather_suffices, [*models, *(flight.model for flight in held_out)])
         attribution, checked = standing_explanation(attribution, validator)
-    taken = shares_taken_away(checked.simulation_gap.per_channel) if checked.simulation_gap else ()
+    flown = checked.simulation_gap.per_channel if checked.simulation_gap else {}
+    turned = {name: table._asdict() for name, table in checked.attitude.items()}
+    taken = shares_taken_away({**flown, **turned})
     if weather.result() and not (attribution.causes and causes_exceed_weather(taken)):
         attribution = attribution.without_causes().as_in_file()
         of_file = validator(attribution).as_in_file()
@@ -158,7 +167,8 @@ def standing_explanation(attribution: Attribution, validator: Validator) -> tupl
 
 
 def _stands(attribution: Attribution, checked: Check) -> bool:
-    return causes_stand(checked.gaps, excused=not attribution.relieves_derivatives)
+    attitude = tuple(checked.attitude.values())
+    return causes_stand(checked.gaps, attitude, excused=not attribution.relieves_derivatives)
 
 
 def _without_needless_causes(

@@ -15,6 +15,9 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
 
+#: Channels that compare the attitude with the integral of the gyroscopes' rates.
+ATTITUDE = ("phi", "theta", "psi")
+
 
 class Errors(Protocol):
     """Errors by one measure."""
@@ -40,20 +43,28 @@ class ErrorTable(NamedTuple):
     after: float
 
 
-def causes_stand(errors: Sequence[Errors], *, excused: bool = True, thresholds: Thresholds = THRESHOLDS) -> bool:
+def causes_stand(
+    errors: Sequence[Errors],
+    attitude: Sequence[Errors] = (),
+    *,
+    excused: bool = True,
+    thresholds: Thresholds = THRESHOLDS,
+) -> bool:
     """Whether causes predict better than the derivatives by at least one measure, and than the file by every one.
 
     Where they take away a large share of the error by one measure, they may tie with the file by another: one that
-    does not see what they change.
+    does not see what they change. In gusts that is often the whole of either; ``attitude`` are the errors of the
+    attitude by the gyroscopes, in which no gusts are.
 
     Derivatives that no tolerances together have ``excused`` may predict a little better than a cause that makes them
     plausible again.
     """
     most = 1.0 if excused else thresholds.validation.unexcused
     limits = thresholds.validation
-    large = any(e.after < limits.large_improvement * e.before for e in errors)
+    seen = (*errors, *attitude)
+    large = any(e.after < limits.large_improvement * e.before for e in seen)
     worst = limits.tie if large else 1.0
-    return any(e.after < most * e.tolerances for e in errors) and all(e.after < worst * e.before for e in errors)
+    return any(e.after < most * e.tolerances for e in seen) and all(e.after < worst * e.before for e in errors)
 
 
 def file_predicts_better(errors: Sequence[Errors], thresholds: Thresholds = THRESHOLDS) -> bool:
@@ -99,6 +110,19 @@ def shares_taken_away(readings: Mapping[str, Mapping[str, float]]) -> tuple[floa
     """
     pairs = ((min(e["before"], e["tolerances"]), e["after"]) for e in readings.values())
     return tuple(1.0 - (after / error) ** 2 if error > 0.0 else 0.0 for error, after in pairs)
+
+
+def attitude_errors(
+    channels: Mapping[str, Mapping[str, float]], thresholds: Thresholds = THRESHOLDS
+) -> dict[str, ErrorTable]:
+    """Of errors (rms) by channel those of the attitude by the gyroscopes that matter.
+
+    What turns the aircraft turns both, so that no weather is in them.
+    """
+    least = thresholds.acceptance.noticeable_error
+    shown = {name: channels[name] for name in ATTITUDE if name in channels}
+    tables = {name: ErrorTable(e["before"], e["tolerances"], e["after"]) for name, e in shown.items()}
+    return {name: table for name, table in tables.items() if table.before > least}
 
 
 def causes_exceed_weather(taken: Sequence[float], thresholds: Thresholds = THRESHOLDS) -> bool:

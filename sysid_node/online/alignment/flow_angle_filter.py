@@ -108,7 +108,7 @@ class FlowAngleFilter:
     covariance: Array = field(default_factory=lambda: np.empty((0, 0)))
     imu: Sequence[float] = ()  # the last reading
     innovations: Innovations = field(default_factory=Innovations)
-    gain: Array = field(default_factory=lambda: np.empty((0, 0)))  # (8, 3) of the last correction; empty before it
+    gain: NDArray[np.floating] = field(default_factory=lambda: np.empty((0, 0)))  # (8, 3) of the last correction
     band: BandEnergies = field(default_factory=BandEnergies)
 
     @property

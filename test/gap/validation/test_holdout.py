@@ -48,7 +48,8 @@ class Explanation:
 def by_cholesky(explanation: Explanation, *_: object) -> SimpleNamespace:
     """The larger, the better it predicts; 3 is as good as the file, for which 1.5 are the derivatives alone."""
     size = float(np.linalg.cholesky(explanation.corrected)[0, 0] ** 2)
-    return SimpleNamespace(gaps=[SimpleNamespace(before=3.0, tolerances=1.5, after=3.0 / size)], size=size)
+    gaps = [SimpleNamespace(before=3.0, tolerances=1.5, after=3.0 / size)]
+    return SimpleNamespace(gaps=gaps, attitude={}, size=size)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pytest
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.gap.validation.standing import (
     ErrorTable,
+    attitude_errors,
     causes_exceed_weather,
     causes_stand,
     file_derivatives_suit_causes,
@@ -60,6 +61,20 @@ def test_what_causes_take_away_of_a_reading_on_other_flight_is_no_weather() -> N
     limit = THRESHOLDS.validation.beyond_weather
     assert not causes_exceed_weather((limit,)) and causes_exceed_weather((limit + 1e-9,))
     assert not causes_exceed_weather(())
+
+
+def test_a_gyros_bias_is_seen_in_the_attitude_where_gusts_hide_it_elsewhere() -> None:
+    hidden = [ErrorTable(1.42, 1.25, 1.24), ErrorTable(0.614, 0.626, 0.624)]
+    found = attitude_errors({"theta": {"before": 1.52, "tolerances": 1.52, "after": 0.015}, "q": {}})
+    assert found == {"theta": ErrorTable(1.52, 1.52, 0.015)}
+    assert causes_stand(hidden, [*found.values()]) and not causes_stand(hidden)
+    worse = [hidden[0], ErrorTable(0.614, 0.626, 0.65)]
+    assert not causes_stand(worse, [*found.values()])
+
+
+def test_an_attitude_that_the_gyroscopes_give_says_nothing() -> None:
+    small = {"before": THRESHOLDS.acceptance.noticeable_error, "tolerances": 0.05, "after": 0.01}
+    assert attitude_errors({"phi": small}) == {}
 
 
 @pytest.mark.parametrize(("tolerances", "better"), [(0.9, False), (1.0, False), (1.0 + 1e-12, True)])
