@@ -80,6 +80,7 @@ class AddedSize:
     bias: float = 0.0  # the largest that was added beyond its standard error, in 1 sigma that the file states, else 0
     play: float = 0.0  # least share of a control's travel that a free play takes, where it is one
     by_clock: float = 0.0  # s, by which the offset of the commands' clock delays the response beside it
+    gradual: bool = False  # whether it is a flow separation that does not set in at any angle of attack
 
 
 @dataclass(frozen=True)
@@ -206,6 +207,8 @@ def _implausibility(scores: ComparisonScores, thresholds: Thresholds, *, togethe
         return "its time is within one sample"
     if added.play > thresholds.priors.jammed:
         return "with so much free play the surface does not move: it is stuck"
+    if added.gradual:
+        return "the flow separates gradually at all angles of attack: it is no stall"
     return "no real part is off so far" if added.largest > thresholds.acceptance.plausible else None
 
 

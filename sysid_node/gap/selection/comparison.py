@@ -21,6 +21,7 @@ from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.instruments.overidentification import overidentification_of
 from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.excited_axes import excited_channels
+from sysid_node.gap.residuals.parameter_priors import bounds
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.residuals.windowed_spectra import power_of
 from sysid_node.gap.selection.acceptance import (
@@ -62,8 +63,9 @@ class Comparison:
         fitted, models = self.fitted, self.fitted.fit.models
         period = max(max(model.flight.step_interval, 1.0 / model.flight.air_rate) for model in models)
         return AddedSize(
-            _time(fitted), period, _largest_size(fitted), _largest_bias(fitted), _play(fitted), _by_clock(fitted)
-        )
+            _time(fitted), period, _largest_size(fitted), _largest_bias(fitted), _play(fitted), _by_clock(fitted),
+            _is_gradual(fitted),
+        )  # fmt: skip
 
     @cached_property
     def probability(self) -> float:
@@ -145,6 +147,18 @@ def _play(fitted: FittedSet) -> float:
     travel = dict(zip(simulator.layout.controls, 2.0 * travel_of(fitted.fit.models), strict=True))
     widths = {name: each.value(point) for name, each in stated_parameters(simulator.layout, _FREE_PLAY).items()}
     return min((w / travel[name] for name, w in widths.items() if w > 0.0 and travel.get(name)), default=0.0)
+
+
+def _is_gradual(fitted: FittedSet) -> bool:
+    """Whether a flow separation was added that begins at the smallest angle, or as gradually, as the range allows.
+
+    Less lift at all angles of attack is another slope of the lift.
+    """
+    fit, added = fitted.fit, fitted.added
+    if added is None or added.effect != "stall_separation":
+        return False
+    shape = [i for i in added.indices if fit.simulator.parameters[i][1].name in ("alpha_star", "a1")]
+    return bool((fit.flights[0].point[shape] <= bounds(fit.simulator, shape)[0] * (1.0 + 1e-6)).any())
 
 
 def _largest_size(fitted: FittedSet) -> float:

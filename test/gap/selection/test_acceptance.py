@@ -106,6 +106,7 @@ def table(**changes: object) -> ComparisonTable:
         ({"added": added(time=0.005)}, "within one sample"),
         ({"added": added(time=-0.005)}, "within one sample"),
         ({"added": added(time=0.1)}, None),
+        ({"added": added(gradual=True)}, "no stall"),
         ({"probability": 0.5}, "predict better"),
         ({"channels": LITTLE}, "too little"),
         ({"channels": powers(contribution=np.zeros(12))}, "too little"),

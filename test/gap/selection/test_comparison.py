@@ -56,6 +56,19 @@ def test_early_stamps_of_the_commands_delay_the_response_beside_a_lag(lag, offse
     assert Comparison(lag.base, lag.without, moved).added.by_clock == pytest.approx(counted)
 
 
+@pytest.mark.parametrize(("shape", "gradual"), [({}, False), ({"alpha_star": 0.05}, True), ({"a1": 5.0}, True)])
+def test_less_lift_at_all_angles_of_attack_is_no_stall(stalling, shape: dict[str, float], gradual: bool) -> None:
+    """Truth: a stall at 0.17 rad; then the same with the least angle or abruptness of its range."""
+    fitter, base, candidates = stalling
+    fitted = fitter.add_candidate(base, candidates["stall_separation"])
+    names = fitted.fit.simulator.names
+    point = fitted.fit.flights[0].point.copy()
+    point[[names.index(f"stall_separation.{name}") for name in shape]] = [*shape.values()]
+    (flight,) = fitted.fit.flights
+    moved = replace(fitted, fit=replace(fitted.fit, flights=(replace(flight, point=point),)))
+    assert Comparison(base, base, moved).added.gradual is gradual
+
+
 def test_a_free_play_counts_by_its_share_of_the_travel_of_its_control(loose) -> None:
     """Truth: the rudder goes 0.12 rad to either side; its free play was 0.08 rad."""
     fitter, base, candidates = loose
