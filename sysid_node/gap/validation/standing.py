@@ -54,7 +54,8 @@ def causes_stand(
 
     Where they take away a large share of the error by one measure, they may tie with the file by another: one that
     does not see what they change. In gusts that is often the whole of either; ``attitude`` are the errors of the
-    attitude by the gyroscopes, in which no gusts are.
+    attitude by the gyroscopes, in which no gusts are. Where they take away much of the error of short flights, they may
+    be worse by the other measure by as much as still halves the product of both errors, as fitted derivatives may.
 
     Derivatives that no tolerances together have ``excused`` may predict a little better than a cause that makes them
     plausible again.
@@ -63,7 +64,7 @@ def causes_stand(
     limits = thresholds.validation
     seen = (*errors, *attitude)
     large = any(e.after < limits.large_improvement * e.before for e in seen)
-    worst = limits.tie if large else 1.0
+    worst = _worst(errors[-1].after, errors[-1].before, thresholds, otherwise=limits.tie if large else 1.0)
     return any(e.after < most * e.tolerances for e in seen) and all(e.after < worst * e.before for e in errors)
 
 
@@ -74,10 +75,19 @@ def file_predicts_better(errors: Sequence[Errors], thresholds: Thresholds = THRE
     a large share of the error by the last measure, that of short flights, they may tie with the file by the other; and
     be worse by as much as still halves the product of both errors.
     """
-    limits, last = thresholds.validation, errors[-1]
-    large = last.tolerances < limits.large_improvement * last.before
-    worst = max(limits.tie, limits.product * last.before / max(last.tolerances, 1e-300)) if large else 1.0
+    worst = _worst(errors[-1].tolerances, errors[-1].before, thresholds, otherwise=1.0)
     return any(e.tolerances > worst * e.before for e in errors)
+
+
+def _worst(left: float, before: float, thresholds: Thresholds, *, otherwise: float) -> float:
+    """Largest ratio to the file's error that is allowed by each measure, where the last one leaves an error.
+
+    Where the last measure, that of short flights, takes a large share away: a tie, or what halves the product of both.
+    """
+    limits = thresholds.validation
+    if not left < limits.large_improvement * before:
+        return otherwise
+    return max(limits.tie, limits.product * before / max(left, 1e-300))
 
 
 def is_needless(with_it: Sequence[Errors], without: Sequence[Errors]) -> bool:

@@ -72,6 +72,16 @@ def test_a_gyros_bias_is_seen_in_the_attitude_where_gusts_hide_it_elsewhere() ->
     assert not causes_stand(worse, [*found.values()])
 
 
+def test_causes_may_be_worse_by_frequency_where_they_halve_the_product_of_both_errors() -> None:
+    """Truth: a mass 15 % off, as flights without vanes show it."""
+    by_frequency, flown = ErrorTable(0.261, 0.308, 0.299), ErrorTable(0.705, 0.164, 0.128)
+    assert causes_stand([by_frequency, flown])
+    most = THRESHOLDS.validation.product * flown.before * by_frequency.before / flown.after
+    assert causes_stand([by_frequency._replace(after=0.999 * most), flown])
+    assert not causes_stand([by_frequency._replace(after=1.001 * most), flown])
+    assert not causes_stand([by_frequency, flown._replace(tolerances=0.7, after=0.6)])
+
+
 def test_an_attitude_that_the_gyroscopes_give_says_nothing() -> None:
     small = {"before": THRESHOLDS.acceptance.noticeable_error, "tolerances": 0.05, "after": 0.01}
     assert attitude_errors({"phi": small}) == {}
