@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
@@ -33,13 +34,21 @@ _LONGEST_STEP = 0.5  # s
 
 @dataclass(frozen=True)
 class FilterHistory:
-    """When and how the filter of a flight was begun and corrected, and the angles (rad) that it gave."""
+    """What the filter of a flight did at each of its N samples."""
 
-    angles: dict[str, Array]  # (N,) each
-    corrected: Array  # (M,) s
-    gains: Array  # (M, 8, 3) of the mean differences of airspeed (m/s), alpha and beta (rad) since the last correction
-    begun: Array  # (B,) s
-    starts: Array  # (B, 8) states, the velocity that of the CG
+    time: Array  # (N,) s
+    states: Array  # (N, 8) after the sample, the velocity that of the CG
+    gains: Array  # (N, 8, 3) of the mean differences of airspeed (m/s), alpha and beta (rad) since the last correction
+    corrects: NDArray[np.bool_]  # (N,) whether it was corrected
+    begins: NDArray[np.bool_]  # (N,) whether it was begun
+    angles: tuple[str, ...]  # those that are inferred
+
+    def between(self, begin: float, end: float) -> FilterHistory:
+        """The part between two times, s, begun with the state that the filter had there; its time begins at zero."""
+        kept = (self.time >= begin) & (self.time <= end)
+        time, states, gains = self.time[kept], self.states[kept], self.gains[kept]
+        begins = self.begins[kept] | (np.arange(time.size) == 0)
+        return FilterHistory(time - time[0], states, gains, self.corrects[kept] & ~begins, begins, self.angles)
 
 
 def missing_flow_angles(record: FlightRecord) -> tuple[str, ...]:
@@ -59,33 +68,24 @@ def inferred_angles(
         raise InputError(
             f"{source}: no {' or '.join(angles)}; they can be inferred where the aircraft file has CL_alpha and CY_beta"
         )
-    history = _filtered(filter_, filter_.model, record.time, _samples(aircraft, record, angles), angles)
-    return replace(record, columns={**record.columns, **history.angles}), history
+    filled, history = _filtered(filter_, filter_.model, record.time, _samples(aircraft, record, angles), angles)
+    columns = {name: filled[:, SAMPLE_COLUMNS.index(name)] for name in angles}
+    return replace(record, columns={**record.columns, **columns}), history
 
 
 def _filtered(
     filter_: FlowAngleFilter, model: FlowAngleModel, time: Array, samples: Array, angles: tuple[str, ...]
-) -> FilterHistory:
-    """What the filter makes of samples (N, M) at ``time`` (N,) s."""
-    filled, corrected, gains, begun, starts = [], [], [], [], []
-    for now, sample in zip(time.tolist(), samples.tolist(), strict=True):
+) -> tuple[Array, FilterHistory]:
+    """Samples (N, M) at ``time`` (N,) s with what the filter makes of them, and how."""
+    filled, states = [], np.zeros((time.size, STATES))
+    gains, corrects, begins = np.zeros((time.size, STATES, 3)), np.zeros(time.size, bool), np.zeros(time.size, bool)
+    for i, (now, sample) in enumerate(zip(time.tolist(), samples.tolist(), strict=True)):
         filled.append(flow_angle_filter.complete(filter_, now, sample, _LONGEST_STEP))
-        if filter_.innovations.since != now:
-            continue
-        if filter_.gain.size:
-            corrected.append(now)
-            gains.append(filter_.gain)
-        else:
-            begun.append(now)
-            starts.append([*velocity_at_cg(filter_.state, model, sample), *filter_.state[3:]])
-    columns = np.array(filled)
-    return FilterHistory(
-        {name: columns[:, SAMPLE_COLUMNS.index(name)] for name in angles},
-        np.array(corrected),
-        np.array(gains).reshape(-1, STATES, 3),
-        np.array(begun),
-        np.array(starts).reshape(-1, STATES),
-    )
+        states[i] = [*velocity_at_cg(filter_.state, model, sample), *filter_.state[3:]]
+        if filter_.innovations.since == now:
+            corrects[i], begins[i] = filter_.gain.size > 0, filter_.gain.size == 0
+            gains[i] = filter_.gain if corrects[i] else 0.0
+    return np.array(filled), FilterHistory(time, states, gains, corrects, begins, angles)
 
 
 def _samples(aircraft: Aircraft, record: FlightRecord, angles: tuple[str, ...]) -> Array:

@@ -123,19 +123,20 @@ def _with_flow_angles(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     angles = missing_flow_angles(flight.record)
     if not angles or not all(np.isfinite(flight.record[name]).all() for name in ("ay", "p", "r")):
         return flight
-    return _inferred(aircraft, replace(flight, inferred=angles))
+    return with_inferred_angles(aircraft, replace(flight, inferred=angles))
 
 
-def _inferred(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
-    """The flight with its missing flow angles inferred."""
+def with_inferred_angles(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
+    """The flight with the flow angles inferred that nobody measured."""
+    if not flight.inferred:
+        return flight
     record, history = inferred_angles(aircraft, flight.record, flight.inferred, flight.source)
     return replace(flight, record=record, history=history)
 
 
 def inferred_again(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     """The flight with its flow angles and thrust inferred anew where nobody measured them."""
-    if flight.inferred:
-        flight = _inferred(aircraft, flight)
+    flight = with_inferred_angles(aircraft, flight)
     if flight.metered:
         return flight
     return replace(flight, record=with_inferred_thrust(aircraft, flight.record))

@@ -44,7 +44,12 @@ def cut_to_manoeuvre(flight: GapFlight, controls: tuple[str, ...]) -> GapFlight:
     kept = (record.time >= begin) & (record.time <= end)
     if (commands[~kept].var(axis=0) > limits.elsewhere * commands[kept].var(axis=0)).any():
         return flight
-    return replace(flight, record=_between(flight.record, begin, end), left_out=flight.record.duration - (end - begin))
+    return replace(
+        flight,
+        record=_between(flight.record, begin, end),
+        history=flight.history and flight.history.between(begin, end),
+        left_out=flight.record.duration - (end - begin),
+    )
 
 
 def _between(record: FlightRecord, begin: float, end: float) -> FlightRecord:

@@ -88,9 +88,10 @@ def residual_model_of(
     return replace(known, gain=_noise_gain(known, seed)) if followed.vane == 0.0 else known
 
 
-def residual_model_like(model: ResidualModel, record: FlightRecord) -> ResidualModel:
-    """The residual model of another record of the same length, with the noise and the observer of this one."""
-    again = noiseless_model(model.simulator, model.flight, record, model.windows, model.axes, model.inputs.memory)
+def residual_model_like(model: ResidualModel, flight: GapFlight) -> ResidualModel:
+    """The residual model of another flight of the same length, with the noise and the observer of this one."""
+    record = resampled(flight, model.simulator.rate)
+    again = noiseless_model(model.simulator, flight, record, model.windows, model.axes, model.inputs.memory)
     return replace(again, noise=model.noise)
 
 

@@ -56,15 +56,18 @@ def filter_steps(
         raise InputError(f"aircraft {aircraft.name!r}: flow angles are inferred from CL_alpha and CY_beta")
     gains, starts = np.zeros((length, STATES, 3)), np.zeros((length, STATES))
     corrects, begins = np.zeros(length), np.zeros(length)
+    for flags, values, marked, kept in (
+        (corrects, gains, history.corrects, history.gains),
+        (begins, starts, history.begins, history.states),
+    ):
+        places = np.rint(history.time[marked] * rate).astype(np.intp)
+        within = places < len(record)
+        flags[places[within]], values[places[within]] = 1.0, kept[marked][within]
     interval = np.where(np.arange(length) < len(record), 1.0 / rate, 0.0)
-    at = _on_grid(history.corrected, rate, len(record))
-    gains[at], corrects[at] = history.gains[: len(at)], 1.0
-    at = _on_grid(history.begun, rate, len(record))
-    starts[at], begins[at] = history.starts[: len(at)], 1.0
     missing = length - len(record)
     series = (2.0 * model.mass_over_area / record["rho"], *_known_parts(model, aircraft, record))
     scale, lift, side = (jnp.asarray(np.pad(part, (0, missing), mode="edge")) for part in series)
-    slopes, inferred = np.array([model.lift.slope, model.side.slope]), np.isin(ANGLES, list(history.angles))
+    slopes, inferred = np.array([model.lift.slope, model.side.slope]), np.isin(ANGLES, history.angles)
     of_filter = [jnp.asarray(part) for part in (interval, gains, corrects, starts, begins)]
     of_file = [scale, lift, side, jnp.asarray(slopes), jnp.asarray(inferred, float)]
     return FilterSteps(*of_filter, *of_file)
@@ -134,12 +137,6 @@ def _innovations(state: Scalar, reading: Scalar, reference: Scalar, slopes: Scal
     lifting, _ = lift_and_drag(reading[0], reading[2] - state[_BIASES][2], jnp.cos(alpha), jnp.sin(alpha))
     angles = (scale * lifting - lift) / slopes[0], (scale * reading[1] - side) / slopes[1]
     return jnp.stack([speed - own, angles[0] - alpha, angles[1] - beta])
-
-
-def _on_grid(times: Array, rate: float, samples: int) -> Array:
-    """The samples nearest to times (s), as many as lie within the record."""
-    places: Array = np.rint(times * rate).astype(np.intp)
-    return places[places < samples]
 
 
 def _known_parts(model: FlowAngleModel, aircraft: Aircraft, record: FlightRecord) -> tuple[Array, Array]:

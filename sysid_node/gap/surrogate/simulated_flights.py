@@ -103,7 +103,8 @@ def _part(flight: GapFlight, begin: float, end: float) -> GapFlight:
     columns = {name: values[kept] for name, values in record.columns.items()}
     start = record.start_ns + round(1e9 * float(record.time[kept][0]))
     time = record.time[kept] - record.time[kept][0]
-    return replace(flight, record=FlightRecord(time, columns, record.name, start, record.rejected))
+    part = FlightRecord(time, columns, record.name, start, record.rejected)
+    return replace(flight, record=part, history=flight.history and flight.history.between(begin, end))
 
 
 def _sources(flights: Sequence[GapFlight]) -> str:

@@ -22,7 +22,7 @@ from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.spectral_weights import real_rows, weights
-from sysid_node.gap.flightdata.gap_flight import resampled
+from sysid_node.gap.flightdata.gap_flight import with_inferred_angles
 from sysid_node.gap.residuals.build import residual_model_like
 from sysid_node.gap.residuals.parameter_priors import prior
 from sysid_node.gap.residuals.residual_model import ResidualModel
@@ -159,7 +159,7 @@ def _flown(model: ResidualModel, fit: CandidateFit, specs: list[str]) -> Residua
     columns |= {name: np.asarray(sortie.flight.commands)[:, i] for i, name in enumerate(_symbols(simulator))}
     columns["rho"] = np.asarray(air_density(-jnp.asarray(sortie.flight.states)[:, 2], jnp))
     flight = replace(model.flight, record=FlightRecord(record.time, columns), imu_rate=simulator.rate, source="")
-    return residual_model_like(model, resampled(flight, simulator.rate))
+    return residual_model_like(model, with_inferred_angles(simulator.aircraft, flight))
 
 
 def _symbols(simulator: Simulator) -> tuple[str, ...]:

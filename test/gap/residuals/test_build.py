@@ -27,8 +27,8 @@ def test_a_heading_that_was_not_measured_is_not_compared(aircraft, plain) -> Non
     assert [c for c, measured in zip(CHANNELS, model.axes, strict=True) if not measured] == ["psi"]
 
 
-def test_the_same_record_seen_alike_is_the_same_model(plain_model) -> None:
-    again = residual_model_like(plain_model, plain_model.record)
+def test_the_same_flight_seen_alike_is_the_same_model(plain_model) -> None:
+    again = residual_model_like(plain_model, plain_model.flight)
     neutral = plain_model.simulator.neutral()
     np.testing.assert_array_equal(again.noise, plain_model.noise)
     np.testing.assert_allclose(again.residual(neutral), plain_model.residual(neutral), atol=1e-12)
