@@ -4,7 +4,7 @@ They come from the online estimator's kinematic filter (``online.alignment.flow_
 corrected slowly by the lift and side force of the aircraft file. So they share the IMU's clock and errors, do not
 contain gusts, and are no measurements that could be compared. Their mean is that of the aircraft file; its error, by
 which lift is mistaken for drag, is a nuisance parameter. How the filter was corrected is kept, so that the angles can
-follow other errors of the instruments (``residuals.inferred_flow``).
+follow other errors of the instruments (``inferred_flow``).
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flightdata import thrust
 from sysid_node.gap.flightdata.flow_angles import FilterHistory
 from sysid_node.gap.flightdata.gap_flight import GapFlight, resampled
+from sysid_node.gap.flightdata.inferred_flow import filter_steps
 from sysid_node.gap.flightdata.time_scales import highest_frequency
 from sysid_node.gap.residuals.air_motion import (
     LONGEST_MEMORY,
@@ -25,7 +26,6 @@ from sysid_node.gap.residuals.air_motion import (
     observer_memory,
 )
 from sysid_node.gap.residuals.flight_path_reconstruction import READINGS, motion_of
-from sysid_node.gap.residuals.inferred_flow import filter_steps
 from sysid_node.gap.residuals.noise_gain import NoiseGain, gain_from, noisy_parameters
 from sysid_node.gap.residuals.predictions import CHANNELS, ObserverMemory, PredictionInputs
 from sysid_node.gap.residuals.residual_model import Measurement, ResidualModel, joined

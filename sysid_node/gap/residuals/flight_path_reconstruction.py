@@ -23,7 +23,7 @@ from sysid_node.dynamics.lever_arm import specific_force_from, velocity_at, velo
 from sysid_node.dynamics.rigid_body import kinematic_rates
 from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import FlightRecord
-from sysid_node.gap.residuals.inferred_flow import FilterSteps, inferred_velocity
+from sysid_node.gap.flightdata.inferred_flow import FilterSteps, inferred_velocity
 from sysid_node.sim.effects import air_data_lag, imu_misalignment
 from sysid_node.sim.effects.actuator_lag import first_order_series
 from sysid_node.sim.model.chain import Chain

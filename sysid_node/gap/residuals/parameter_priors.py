@@ -21,6 +21,9 @@ _STAMP_EFFECTS = frozenset({"air_data_delay", "imu_delay", "actuator_stamp_delay
 
 _STRUCTURAL_FREQUENCY = ("structural_mode", "frequency")
 
+#: Least abruptness of a stall: from 0.9 to 0.1 of the flow attached within 0.44 rad. What is slower is another slope.
+_ABRUPTNESS, _LEAST_ABRUPT = ("stall_separation", "a1"), 5.0
+
 #: Farthest that an instrument may be off its place, in spans: a nose boom is shorter than a fuselage.
 _FARTHEST = {"vane_lever_arm": 1.5, "imu_lever_arm": 1.0}
 
@@ -37,6 +40,7 @@ def bounds(simulator: Simulator, indices: Sequence[int]) -> tuple[Array, Array]:
     lower = [
         THRESHOLDS.priors.jammed if effect == "stuck_surface" and parameter.switch
         else THRESHOLDS.priors.lowest_mode if (effect, parameter.name) == _STRUCTURAL_FREQUENCY
+        else _LEAST_ABRUPT if (effect, parameter.name) == _ABRUPTNESS
         else 0.0 if effect in _STAMP_EFFECTS
         else parameter.lower
         for effect, parameter in table

@@ -21,7 +21,7 @@ EFFECT = Effect(
         SimulationParameter(
             "alpha_star", "rad", "angle at which half the flow is separated", 0.04, 0.26, 0.05, 1.0, False
         ),
-        SimulationParameter("a1", "1", "how abruptly", 5.0, 20.0, 5.0, 60.0, False),
+        SimulationParameter("a1", "1", "how abruptly", 5.0, 20.0, 1.0, 60.0, False),
         SimulationParameter("tau1", "cbar/V", "relaxation time", 5.0, 10.0, 0.5, 100.0, False),
         SimulationParameter("tau2", "cbar/V", "delay with the rate of alpha", 2.0, 3.0, 0.0, 30.0, False),
         SimulationParameter("CD_X", "1", "drag of full separation", 0.05, 0.1, -1.0, 2.0, False),

@@ -10,10 +10,10 @@ from gap_flights import RATE, fly
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
+from sysid_node.gap.flightdata.inferred_flow import filter_steps
 from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.flight_path_reconstruction import corrected_motion
-from sysid_node.gap.residuals.inferred_flow import filter_steps
 from sysid_node.gap.residuals.predictions import CHANNELS
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.sim import Simulator
