@@ -81,6 +81,8 @@ def _filtered(
     gains, corrects, begins = np.zeros((time.size, STATES, 3)), np.zeros(time.size, bool), np.zeros(time.size, bool)
     for i, (now, sample) in enumerate(zip(time.tolist(), samples.tolist(), strict=True)):
         filled.append(flow_angle_filter.complete(filter_, now, sample, _LONGEST_STEP))
+        if not filter_.state:  # no reading of a flight has come yet
+            continue
         states[i] = [*velocity_at_cg(filter_.state, model, sample), *filter_.state[3:]]
         if filter_.innovations.since == now:
             corrects[i], begins[i] = filter_.gain.size > 0, filter_.gain.size == 0

@@ -105,6 +105,14 @@ def test_what_cannot_be_inferred_is_said(aircraft, plain) -> None:
         blind(replace(aircraft, derivatives=derivatives), plain, "alpha", "beta")
 
 
+def test_readings_before_the_flight_are_said(aircraft, plain) -> None:
+    """The filter begins where air flows: standing still the aircraft has no angle of attack."""
+    standing = np.where(plain.record.time < 1.0, 0.1, plain.record["V"])
+    flight = replace(plain, record=replace(plain.record, columns={**plain.record.columns, "V": standing}))
+    with pytest.raises(InputError, match=r"no complete alpha; the gap cannot be measured without"):
+        blind(aircraft, flight, "alpha", "beta")
+
+
 def test_the_floor_without_vanes_knows_of_gusts(aircraft, make_flight) -> None:
     """What no vane shows is no error of the simulator; in still air there is nothing that it could not see."""
     floors = []
