@@ -193,7 +193,12 @@ def is_relevant(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -
     cause does, and is no alternative to it. Beside a lag the offset of the commands' clock may explain a sample of the
     response's delay; the lag itself is the rest. Both together are what a delay of the commands explains alone.
     """
-    return _implausibility(scores, thresholds, together=True) is None and _is_large(scores, thresholds.acceptance)
+    return is_plausible(scores, thresholds) and _is_large(scores, thresholds.acceptance)
+
+
+def is_plausible(scores: ComparisonScores, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether a cause passes rule 1 as it stands in the whole explanation, where its size may be another than alone."""
+    return _implausibility(scores, thresholds, together=True) is None
 
 
 def _implausibility(scores: ComparisonScores, thresholds: Thresholds, *, together: bool = False) -> str | None:

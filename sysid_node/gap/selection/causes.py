@@ -19,7 +19,7 @@ from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.predictive_density import probabilities
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor, log_bayes_factor_of_alternatives
 from sysid_node.gap.residuals.excited_axes import excited_windows
-from sysid_node.gap.selection.acceptance import is_relevant, nats_by_tolerances
+from sysid_node.gap.selection.acceptance import is_plausible, is_relevant, nats_by_tolerances
 from sysid_node.gap.selection.alternatives import CauseAlternatives, replace_stepwise
 from sysid_node.gap.selection.calibration import CauseEvidence, calibrated_probability, evidence_of, prior_odds
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
@@ -53,17 +53,23 @@ class Cause:
     alternative_sets: tuple[FittedSet, ...]  # what was fitted in its place
     without: FittedSet  # the explanation without it
     replaced: bool = False  # whether a probable alternative took its place
+    plausible: bool = True  # whether real parts are off as far as it is in this explanation
 
     @property
     def probability(self) -> float:
         """Probability that it is there."""
-        return self.share * calibrated_probability(self.evidence)
+        return self.share * self.probability_of_any
+
+    @property
+    def probability_of_any(self) -> float:
+        """Probability that it, or an alternative named with it, is there; zero where its size is not plausible."""
+        return calibrated_probability(self.evidence) if self.plausible else 0.0
 
     @property
     def table(self) -> CauseTable:
         """The scores that decide whether it is kept."""
         largest = max((share for _, share in self.alternatives), default=0.0)
-        return CauseTable(self.candidate.label, self.share, largest, calibrated_probability(self.evidence))
+        return CauseTable(self.candidate.label, self.share, largest, self.probability_of_any)
 
 
 def select_causes(
@@ -188,6 +194,7 @@ def _weighed(
         fit=chosen.fit,
         alternative_sets=position.alternatives,
         without=without,
+        plausible=is_plausible(Comparison(base, without, replace(chosen, added=candidate))),
     )
 
 

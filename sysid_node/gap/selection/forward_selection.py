@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted
 from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, Candidate, candidates_of
@@ -23,11 +24,11 @@ from sysid_node.gap.instruments.overidentification import (
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.acceptance import is_accepted, nats_by_tolerances, predicts_better, relieves
-from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress
+from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress, in_parallel
 from sysid_node.gap.selection.causes import Cause, select_causes
 from sysid_node.gap.selection.comparison import Comparison, derivative_shift
 from sysid_node.gap.selection.fitted_set import FittedSet
-from sysid_node.gap.selection.screening import best_screened, with_found_onsets
+from sysid_node.gap.selection.screening import best_screened, with_found_starts
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS
 
@@ -165,18 +166,20 @@ def _forward(
     for count, (width, most) in enumerate(THRESHOLDS.search.stages):
         pairs = fitter.screen_upon(frontier[:width], candidates, _share_of(progress, count))
         fitted = fitter.fit_screened(best_screened(pairs, most), _share_of(progress, count))
-        candidates = with_found_onsets(candidates, [pair.screened for pair in pairs])
+        candidates = with_found_starts(candidates, [pair.screened for pair in pairs])
         stages.append([larger for _, larger in fitted])
-        better = [
-            larger
-            for smaller, larger in fitted
-            if _takes_the_place(base, best, larger)
-            and (smaller is best or is_accepted(Comparison(base, smaller, larger)))
-        ]
+        accepted = in_parallel(partial(_is_better, base, best), fitted, lambda share: None)
+        better = [larger for (_, larger), is_better in zip(fitted, accepted, strict=True) if is_better]
         if not better:
             break
         best, frontier = better[0], better
     return best, stages
+
+
+def _is_better(base: FittedSet, best: FittedSet, pair: tuple[FittedSet, FittedSet]) -> bool:
+    """Whether the larger of two explanations is accepted beside the smaller, and in place of the best so far."""
+    smaller, larger = pair
+    return _takes_the_place(base, best, larger) and (smaller is best or is_accepted(Comparison(base, smaller, larger)))
 
 
 def _takes_the_place(base: FittedSet, best: FittedSet, larger: FittedSet) -> bool:

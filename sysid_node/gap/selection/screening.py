@@ -55,8 +55,7 @@ def screened(fit: CandidateFit, problem: VariableProjection, candidate: Candidat
     """
     if not candidate.indices:
         widened = with_candidates(fit, [*fit.candidates, candidate], fit.nuisances, ())
-        problem = VariableProjection(widened)
-        return Screened(problem.deviance(widened.values), candidate, ())
+        return Screened(VariableProjection(widened, problem).deviance(widened.values), candidate, ())
     low, high = bounds(fit.simulator, (*fit.indices, *candidate.indices))
     best = Screened(np.inf, candidate, candidate.starts[0])
     extended = problem.with_candidate(candidate)
@@ -145,12 +144,11 @@ def _is_variant(candidate: Candidate) -> bool:
     return candidate.effect == DERIVATIVE_ERROR or (candidate.effect in SHARED and bool(candidate.scope))
 
 
-def with_found_onsets(candidates: Sequence[Candidate], found: Sequence[Screened]) -> list[Candidate]:
-    """The candidates, those with an onset with the best start alone: screening every start again costs most.
+def with_found_starts(candidates: Sequence[Candidate], found: Sequence[Screened]) -> list[Candidate]:
+    """The candidates, those whose starts cost most to screen with the best one alone.
 
-    ``found`` are the candidates screened, the best first.
+    These have an onset, or change what the surfaces do. ``found`` are the candidates screened, the best first.
     """
     best = {each.candidate.label: each.start for each in reversed(found)}
-    return [
-        replace(c, starts=(best[c.label],)) if c.effect in PER_CONTROL and c.label in best else c for c in candidates
-    ]
+    costly = _RESHAPES_COMMANDS.union(PER_CONTROL)
+    return [replace(c, starts=(best[c.label],)) if c.effect in costly and c.label in best else c for c in candidates]

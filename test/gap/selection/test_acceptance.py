@@ -17,6 +17,7 @@ from sysid_node.gap.selection.acceptance import (
     ScoresInGusts,
     channels_improved,
     is_accepted,
+    is_plausible,
     is_relevant,
     nats_by_tolerances,
     rejection,
@@ -148,6 +149,21 @@ def test_a_lag_is_an_alternative_by_the_delay_that_it_and_the_clock_make_togethe
     scores = table(added=added(time=0.005, by_clock=by_clock))
     assert is_relevant(scores) is relevant
     assert not is_accepted(scores)
+
+
+@pytest.mark.parametrize(
+    ("changes", "plausible"),
+    [
+        ({"time": 0.005}, False),
+        ({"time": 0.005, "by_clock": 0.006}, True),
+        ({"gradual": True}, False),
+        ({"largest": LIMITS.plausible + 1e-9}, False),
+        ({"largest": LIMITS.plausible}, True),
+    ],
+)
+def test_a_size_is_plausible_or_not_whatever_else_the_cause_does(changes: dict[str, object], plausible: bool) -> None:
+    for channels in (table().channels, LITTLE):
+        assert is_plausible(table(added=added(**changes), channels=channels)) is plausible
 
 
 @pytest.mark.parametrize(("time", "accepted"), [(0.01 - 1e-9, False), (0.01, True), (0.01 + 1e-9, True)])

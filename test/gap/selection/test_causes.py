@@ -1,11 +1,14 @@
 """The causes that are kept, weighed on a flight; truth: the effect that was flown."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sysid_node.gap.selection.calibration import calibrated_probability
 from sysid_node.gap.selection.causes import select_causes
 from sysid_node.gap.selection.comparison import power_left
+from sysid_node.gap.selection.retention import Challenge, next_challenge
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +31,15 @@ def test_its_probability_is_its_share_of_the_calibrated_one(selected) -> None:
     assert cause.share > 0.95 and cause.share + sum(p for _, p in cause.alternatives) <= 1.0 + 1e-12
     assert cause.probability == pytest.approx(cause.share * calibrated_probability(cause.evidence))
     assert cause.probability > 0.9 and cause.evidence.misfit < 0.2
+
+
+def test_a_size_that_is_not_plausible_in_the_whole_explanation_is_no_cause(selected) -> None:
+    """Its evidence may be as large as it likes: `retention` then drops it or puts an alternative in its place."""
+    _, (cause,), _ = selected
+    assert cause.plausible
+    absurd = replace(cause, plausible=False)
+    assert absurd.probability == absurd.table.probability == 0.0
+    assert next_challenge([absurd.table]) == Challenge(0, improbable=True)
 
 
 def test_its_table_holds_what_decides(selected) -> None:

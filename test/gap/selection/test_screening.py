@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from gap_flights import fly
 
-from sysid_node.gap.estimation.candidate_fit import unfitted
+from sysid_node.gap.estimation.candidate_fit import unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import Candidate, candidates_of
 from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.selection.screening import Screened, ScreenedPair, best_screened, screened, with_found_onsets
+from sysid_node.gap.selection.screening import Screened, ScreenedPair, best_screened, screened, with_found_starts
 from sysid_node.sim import Simulator
 
 
@@ -53,14 +53,26 @@ def test_of_the_wrong_derivatives_of_a_coefficient_the_likeliest_are_fitted() ->
     assert kept == ["Cm_alpha", "Cn"]  # of one effect no more than two
 
 
-def test_onsets_that_were_found_are_the_only_starts_of_the_next_stage() -> None:
-    stuck, shift = labelled("stuck_surface", "elevator"), labelled("cg_shift")
+def test_costly_starts_that_were_found_are_the_only_ones_of_the_next_stage() -> None:
+    stuck, shift, play = labelled("stuck_surface", "elevator"), labelled("cg_shift"), labelled("actuator_backlash")
     screened = [
         Screened(1.0, stuck, (0.3,)),
         Screened(2.0, shift, (0.4,)),
         Screened(3.0, stuck, (0.9,)),
+        Screened(4.0, play, (0.5,)),
     ]  # the best first
-    assert [c.starts for c in with_found_onsets([stuck, shift], screened)] == [((0.3,),), shift.starts]
+    found = [c.starts for c in with_found_starts([stuck, shift, play], screened)]
+    assert found == [((0.3,),), shift.starts, ((0.5,),)]
+
+
+def test_wrong_derivatives_are_screened_with_the_slopes_at_hand(aircraft, plain) -> None:
+    """Truth: the problem with their wider priors, linearised anew where the nuisance parameters are the file's."""
+    model = residual_model_of(Simulator(aircraft, 50.0), plain)
+    fit = converged(unfitted([model], nuisances_of(aircraft, model)), rounds=1)
+    wrong = next(c for c in candidates_of(model.simulator, [model]) if c.label == "derivative_error of Cm")
+    wider = with_candidates(fit, [wrong], fit.nuisances, ())
+    deviance = VariableProjection(wider).deviance(wider.values)
+    assert screened(fit, VariableProjection(fit), wrong).deviance == pytest.approx(deviance, abs=0.01)
 
 
 def test_another_mass_is_seen_although_derivatives_have_gone_to_their_limits(aircraft, plain) -> None:
