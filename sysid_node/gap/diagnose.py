@@ -11,7 +11,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
 from sysid_node.gap.estimation.predictive_density import can_be_divided, transferred_parameters
-from sysid_node.gap.flightdata.gap_flight import GapFlight, inferred_again
+from sysid_node.gap.flightdata.gap_flight import GapFlight, with_inferred_signals
 from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre
 from sysid_node.gap.flightdata.time_scales import analysis_rate
 from sysid_node.gap.residuals.admissibility import require_admissible, require_distinct_flights
@@ -109,7 +109,7 @@ def diagnose(
     real = (*flights, *holdouts)
     surrogate = identify_simulator(aircraft, simulated, real, lambda s, t: progress(0.4 * s, t))
     later: Progress = lambda s, t: progress(0.4 + 0.6 * s, t)  # noqa: E731
-    flights, holdouts = ([inferred_again(surrogate.aircraft, f) for f in group] for group in (flights, holdouts))
+    flights, holdouts = ([with_inferred_signals(surrogate.aircraft, f) for f in group] for group in (flights, holdouts))
     return _diagnosis(surrogate.aircraft, flights, holdouts, later, keep, surrogate)
 
 

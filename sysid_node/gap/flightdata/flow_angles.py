@@ -56,7 +56,7 @@ def missing_flow_angles(record: FlightRecord) -> tuple[str, ...]:
     return tuple(name for name in ANGLES if not record.measured(name))
 
 
-def inferred_angles(
+def run_flow_angle_filter(
     aircraft: Aircraft, record: FlightRecord, angles: tuple[str, ...], source: str
 ) -> tuple[FlightRecord, FilterHistory]:
     """The record with these angles (rad) inferred, and how. Raises InputError where they cannot be."""

@@ -18,7 +18,7 @@ from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs.opening import is_table, open_streams
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import Streams
-from sysid_node.gap.flightdata.flow_angles import FilterHistory, inferred_angles, missing_flow_angles
+from sysid_node.gap.flightdata.flow_angles import FilterHistory, missing_flow_angles, run_flow_angle_filter
 from sysid_node.gap.flightdata.thrust import thrust_missing, with_inferred_thrust
 from sysid_node.sim.prediction.signals import unfiltered_columns
 from sysid_node.sim.signals.low_pass import gaussian_taps, low_passed
@@ -130,11 +130,11 @@ def with_inferred_angles(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     """The flight with the flow angles inferred that nobody measured."""
     if not flight.inferred:
         return flight
-    record, history = inferred_angles(aircraft, flight.record, flight.inferred, flight.source)
+    record, history = run_flow_angle_filter(aircraft, flight.record, flight.inferred, flight.source)
     return replace(flight, record=record, history=history)
 
 
-def inferred_again(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
+def with_inferred_signals(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     """The flight with its flow angles and thrust inferred anew where nobody measured them."""
     flight = with_inferred_angles(aircraft, flight)
     if flight.metered:

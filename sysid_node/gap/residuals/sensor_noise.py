@@ -8,7 +8,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.record import Array
-from sysid_node.gap.flightdata.gap_flight import GapFlight, inferred_again
+from sysid_node.gap.flightdata.gap_flight import GapFlight, with_inferred_signals
 
 #: Columns that each sensor's noise falls on, by the sensor's name in the aircraft file.
 _NOISE = {
@@ -40,7 +40,7 @@ def with_added_noise(aircraft: Aircraft, flight: GapFlight, random: np.random.Ge
             if name in columns and name not in flight.filled:
                 columns[name] = columns[name] + spread * random.standard_normal(len(record))
     columns |= _resampled_commands(aircraft, flight, random)
-    return inferred_again(aircraft, replace(flight, record=replace(record, columns=columns)))
+    return with_inferred_signals(aircraft, replace(flight, record=replace(record, columns=columns)))
 
 
 def _resampled_commands(aircraft: Aircraft, flight: GapFlight, random: np.random.Generator) -> dict[str, Array]:
