@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -37,10 +38,10 @@ class Judged:
 def judge(
     row: Mapping[str, Any],
     holds: Sequence[str],
-    unspiked: float | None,
+    unspiked: Mapping[str, Any] | None,
     own: Mapping[str, float] = MappingProxyType({}),
 ) -> Judged:
-    """A case by its line of the ledger; ``unspiked`` is what the gap of the record as it is falls to.
+    """A case by its line of the ledger; ``unspiked`` is the gap of the record as it is, on its line.
 
     ``own`` are sizes of effects that the record itself holds: what is put in adds to them.
     """
@@ -56,8 +57,22 @@ def judge(
     sized = (
         all(_sized(found["parameters"], n, v + more) for n, v in _sizes(effect, values)) if named and found else None
     )
-    closed = None if unspiked is None or row["gap"] is None else row["gap"]["after"] <= (1.0 + _GAP) * unspiked
+    closed = None if unspiked is None or row["gap"] is None else _is_back(row["gap"], unspiked)
     return Judged(named, sized, closed, wrong, stated)
+
+
+def _is_back(gap: Mapping[str, Any], unspiked: Mapping[str, Any]) -> bool:
+    """Whether a gap has fallen to that of the record as it is, on the channels that are counted in both.
+
+    A channel counts where the commands excite it. Where a surface is said to have been held, its command moves although
+    the aircraft does not, so that more channels count than in the record as it is.
+    """
+    known = [each.get("after_by_channel") for each in (gap, unspiked)]
+    both = known[0].keys() & known[1].keys() if all(known) else set()
+    if not both:  # an older line
+        return bool(gap["after"] <= (1.0 + _GAP) * unspiked["after"])
+    now, then = (math.fsum(each[name] ** 2 for name in both) for each in known)
+    return now <= (1.0 + _GAP) ** 2 * then
 
 
 def _there(cause: Mapping[str, Any], effect: str, holds: Sequence[str]) -> bool:

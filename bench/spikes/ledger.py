@@ -34,8 +34,9 @@ def row(
     found |= {"seconds": round(seconds, 1), "version": version, "refusal": refusal}
     if said is None:
         return found | {"verdict": "refused", "gap": None, "air_motion": None, "causes": [], "doubted": []}
-    found |= {"verdict": said["verdict"], "gap": {name: said["gap"][name] for name in _GAP}}
-    found |= {"air_motion": said["air_motion"]}
+    gap = {name: said["gap"][name] for name in _GAP}
+    gap["after_by_channel"] = {name: round(each["after"], 5) for name, each in said["gap"]["per_channel"].items()}
+    found |= {"verdict": said["verdict"], "gap": gap, "air_motion": said["air_motion"]}
     return found | {key: [{n: c[n] for n in _CAUSE if n in c} for c in said[key]] for key in ("causes", "doubted")}
 
 

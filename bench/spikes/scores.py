@@ -17,7 +17,7 @@ _Pairs = Sequence[tuple[Mapping[str, Any], Judged]]
 
 def page(rows: Sequence[Mapping[str, Any]]) -> str:
     """The section of the documentation."""
-    bare = {row["flight"]: row["gap"]["after"] for row in rows if not row["effect"] and row["gap"]}
+    bare = {row["flight"]: row["gap"] for row in rows if not row["effect"] and row["gap"]}
     pairs = [(row, _judged(row, bare.get(row["flight"]))) for row in rows]
     spiked = [pair for pair in pairs if pair[0]["effect"]]
     unspiked = [pair for pair in pairs if not pair[0]["effect"]]
@@ -39,7 +39,7 @@ def page(rows: Sequence[Mapping[str, Any]]) -> str:
     return "\n\n".join(parts)
 
 
-def _judged(row: Mapping[str, Any], unspiked: float | None) -> Judged:
+def _judged(row: Mapping[str, Any], unspiked: Mapping[str, Any] | None) -> Judged:
     flight = FLIGHTS[row["flight"]]
     return judge(row, flight.holds, unspiked, flight.own)
 
@@ -67,7 +67,7 @@ def _overall(spiked: _Pairs, unspiked: _Pairs) -> list[list[str]]:
 _SCORES: tuple[tuple[str, Callable[[_Pairs], Iterable[bool | None]], str], ...] = (
     ("put in: named first, or beside what the record holds", lambda c: [j.named for _, j in c], "85 %"),
     ("of those named: size within 20 % or its interval", lambda c: [j.sized for _, j in c], "85 %"),
-    ("gap within 10 % of that of the record as it is", lambda c: [j.closed for _, j in c], "85 %"),
+    ("gap within 10 % of that of the record as it is (same channels)", lambda c: [j.closed for _, j in c], "85 %"),
     ("the same, of those named", lambda c: [j.closed for _, j in c if j.named], ""),
 )
 

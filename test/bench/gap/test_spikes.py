@@ -88,7 +88,8 @@ def test_a_belief_is_wrong_by_what_was_put_in() -> None:
 
 
 def _row(effect: str, values: dict[str, float], *causes: dict[str, Any], after: float = 0.1) -> dict[str, Any]:
-    said = {"verdict": "explained", "gap": {**GAP, "after": after}, "air_motion": 0.0, "doubted": []}
+    gap = {**GAP, "after": after, "per_channel": {"ay": {"after": after}}}
+    said = {"verdict": "explained", "gap": gap, "air_motion": 0.0, "doubted": []}
     return ledger.row(Case(9, "thor", effect, values), None, {**said, "causes": list(causes)}, "", 1.0, "now")
 
 
@@ -100,11 +101,11 @@ def _cause(effect: str, probability: float = 0.95, rivals: tuple[str, ...] = (),
 
 def test_an_effect_is_named_first_or_beside_what_the_record_holds() -> None:
     late, bias = _cause("command_delay", delay=0.06), _cause("imu_bias", p=0.03)
-    judged = judge(_row("imu_bias", {"p": 0.032}, late, bias), ("command_delay",), 0.1)
+    judged = judge(_row("imu_bias", {"p": 0.032}, late, bias), ("command_delay",), {"after": 0.1})
     assert (judged.named, judged.sized, judged.closed, judged.blamed) == (True, True, True, False)
-    judged = judge(_row("imu_bias", {"p": 0.06}, late, bias, after=0.12), (), 0.1)
+    judged = judge(_row("imu_bias", {"p": 0.06}, late, bias, after=0.12), (), {"after": 0.1})
     assert (judged.named, judged.closed, judged.blamed) == (False, False, True)
-    judged = judge(_row("imu_bias", {"p": 0.06}, bias, after=0.12), (), 0.1)
+    judged = judge(_row("imu_bias", {"p": 0.06}, bias, after=0.12), (), {"after": 0.1})
     assert (judged.named, judged.sized) == (True, False)
     lag = _cause("actuator_lag", elevator=0.11, rudder=0.4)  # stated for each control
     assert judge(_row("actuator_lag", {"time_constant": 0.1}, lag), (), None).sized is False
@@ -112,6 +113,21 @@ def test_an_effect_is_named_first_or_beside_what_the_record_holds() -> None:
     assert judge(_row("actuator_lag", {"time_constant": 0.1}, lag), (), None).sized
     rivals = _cause("vane_scale", 0.5, ("imu_bias",), alpha=0.2)
     assert judge(_row("imu_bias", {"p": 0.06}, rivals), (), None).named
+
+
+def test_the_gap_is_back_on_the_channels_that_count_in_the_record_as_it_is_too() -> None:
+    """A held elevator's command moves, so that pitch counts in a lateral record where it did not before."""
+    row = _row("stuck_surface", {"elevator": 0.05}, _cause("stuck_surface", elevator=0.05))
+    bare = {"after": 0.1, "after_by_channel": {"ay": 0.1, "r": 0.2}}
+    for channels, back in (
+        ({"ay": 0.1, "r": 0.2, "q": 1.3}, True),
+        ({"ay": 0.13, "r": 0.2, "q": 1.3}, True),  # both together within a tenth
+        ({"ay": 0.1, "r": 0.24}, False),
+        ({"ay": 0.1}, True),
+        ({"ay": 0.12}, False),
+    ):
+        row["gap"]["after_by_channel"] = channels
+        assert judge(row, (), bare).closed is back
 
 
 def test_what_is_put_in_adds_to_what_the_record_holds_of_the_same_effect() -> None:
