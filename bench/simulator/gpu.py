@@ -35,10 +35,11 @@ def main() -> None:
     if device is None:
         print(f"no GPU: JAX {jax.__version__} sees {', '.join(map(str, jax.devices()))}; nothing measured")
         return
-    simulator = Simulator(load_aircraft(args.aircraft))
-    trim = trim_flight(simulator)
-    samples = round(args.seconds * simulator.rate) + 1
-    inputs = simulator.inputs(np.tile(trim.command, (samples, 1)))
+    with jax.default_device(jax.devices("cpu")[0]):  # for which the many small programs of a trim compile in seconds
+        simulator = Simulator(load_aircraft(args.aircraft))
+        trim = trim_flight(simulator)
+        samples = round(args.seconds * simulator.rate) + 1
+        inputs = simulator.inputs(np.tile(trim.command, (samples, 1)))
     fixed = jax.device_put((simulator.model, trim.initial, inputs), device)
     print(f"{device.device_kind}: flights of {args.seconds:g} s\n{'batch':>8s} {'flights/s':>12s} {'RK4 steps/s':>14s}")
     size = 1
