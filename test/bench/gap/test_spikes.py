@@ -111,6 +111,9 @@ def test_an_effect_is_named_first_or_beside_what_the_record_holds() -> None:
     assert judge(_row("actuator_lag", {"time_constant": 0.1}, lag), (), None).sized is False
     lag = _cause("actuator_lag", elevator=0.11)
     assert judge(_row("actuator_lag", {"time_constant": 0.1}, lag), (), None).sized
+    lag = _cause("actuator_lag", elevator=0.0707, rudder=0.0707, damping=1.06)  # 0.05 and 0.1 s, one after the other
+    assert judge(_row("actuator_lag", {"time_constant": 0.05}, lag), (), None, {"actuator_lag": 0.1}).sized
+    assert not judge(_row("actuator_lag", {"time_constant": 0.05}, lag), (), None, {"actuator_lag": 0.0}).sized
     rivals = _cause("vane_scale", 0.5, ("imu_bias",), alpha=0.2)
     assert judge(_row("imu_bias", {"p": 0.06}, rivals), (), None).named
 
