@@ -22,6 +22,9 @@ from sysid_node.gap.selection.replacement import Step, are_alike, are_as_stated,
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim.model.parameters import stated_parameters
 
+#: Effects that can imitate others: in their place everything is tried that was fitted alone.
+_FLEXIBLE = THRESHOLDS.calibration.flexible_effects
+
 
 @dataclass(frozen=True)
 class CauseAlternatives:
@@ -89,6 +92,9 @@ def _alternatives(
 ) -> CauseAlternatives:
     """A cause with the likeliest alternatives; where the cause delays the response, with all that delay it.
 
+    Wrong derivatives can stand in for another effect, and explain more than it does with their many parameters. They
+    are compared with every effect that was fitted alone.
+
     What delays the response of one control is compared with what delays that control's, or all controls'. An effect
     with a size for each control is compared with the same effect of each control alone: one slow servo is no more.
     Alternatives to a single cause were fitted in the first stage of the forward selection.
@@ -104,7 +110,8 @@ def _alternatives(
     screened = fitter.screen_upon([without], rest, lambda share, text: None)
     likely = screened[: THRESHOLDS.search.alternatives] if others else []
     rest_screened = screened[len(likely) :]
-    close = [pair for pair in rest_screened if _is_close(pair.screened.candidate, cause)]
+    alone = {each.added.label for each in first if each.added} if cause.effect in _FLEXIBLE else set()
+    close = [p for p in rest_screened if _is_close(p.screened.candidate, cause) or p.screened.candidate.label in alone]
     fitted = fitter.fit_screened([*likely, *close], lambda share, text: None)
     by_label = {} if others else {each.added.label: each for each in first if each.added}
     by_label |= {each.added.label: each for _, each in fitted if each.added}

@@ -28,6 +28,7 @@ from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress,
 from sysid_node.gap.selection.causes import Cause, select_causes
 from sysid_node.gap.selection.comparison import Comparison, derivative_shift
 from sysid_node.gap.selection.fitted_set import FittedSet
+from sysid_node.gap.selection.retention import kept_causes
 from sysid_node.gap.selection.screening import best_screened, with_found_starts
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS
@@ -99,15 +100,14 @@ class Attribution:
         return moved.with_file_derivatives() if self.keeps_file_derivatives else moved
 
     def with_fewer_causes(self) -> Iterator[Attribution]:
-        """Each cause left out in turn, the least probable first; of three also each alone, the most probable first."""
-        by_probability = sorted(self.causes, key=lambda cause: cause.probability)
-        if len(self.causes) > 1:
-            for left_out in by_probability:
-                yield self._explained_by(left_out.without, tuple(c for c in self.causes if c is not left_out))
-        if len(self.causes) > 2:
-            alone = {each.added.label: each for each in self.first_stage if each.added}
-            kept = [cause for cause in reversed(by_probability) if cause.candidate.label in alone]
-            yield from (self._explained_by(alone[cause.candidate.label], (cause,)) for cause in kept)
+        """The explanations with one cause less, and of three those with one alone, in the order of ``kept_causes``."""
+        alone = {each.added.label: each for each in self.first_stage if each.added}
+        for kept in kept_causes([cause.probability for cause in self.causes]):
+            causes = tuple(self.causes[i] for i in kept)
+            left_out = [cause for i, cause in enumerate(self.causes) if i not in kept]
+            chosen = left_out[0].without if len(left_out) == 1 else alone.get(causes[0].candidate.label)
+            if chosen is not None:
+                yield self._explained_by(chosen, causes)
 
     def without_causes(self) -> Attribution:
         """The derivatives within their tolerances alone."""

@@ -7,8 +7,10 @@ where it is accepted and probable itself. ``selection.causes`` measures the tabl
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Protocol
 
 import numpy as np
@@ -136,3 +138,15 @@ def shares_by_effect(
         by_effect[effect] = by_effect.get(effect, 0.0) + float(share)
     others = sorted(((e, p) for e, p in by_effect.items() if e != cause), key=lambda pair: -pair[1])
     return by_effect[cause], tuple(others)
+
+
+def kept_causes(probabilities: Sequence[float]) -> list[tuple[int, ...]]:
+    """Indices of the causes that are kept where one of at most three is left out, or two; in the order to be tried.
+
+    The order is that of the probability that none of those left out is there, the largest first: a cause that is beyond
+    doubt is left out after two that are not. In a tie the larger explanation comes first.
+    """
+    indices = range(len(probabilities))
+    sets = [kept for size in range(len(probabilities) - 1, 0, -1) for kept in combinations(indices, size)]
+    absent = [math.prod(1.0 - probabilities[i] for i in indices if i not in kept) for kept in sets]
+    return [sets[k] for k in sorted(range(len(sets)), key=lambda k: -absent[k])]

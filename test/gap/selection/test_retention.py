@@ -13,6 +13,7 @@ from sysid_node.gap.selection.retention import (
     Challenge,
     SuccessorTable,
     combined_shares,
+    kept_causes,
     next_challenge,
     shares_by_effect,
     successor,
@@ -155,3 +156,11 @@ def test_another_shape_of_the_same_effect_is_the_same_cause() -> None:
 def test_prior_odds_weigh_shares() -> None:
     share, ((_, other),) = shares_by_effect("a", ["b"], np.array([0.5, 0.5, 0.0]), np.array([1.0, 0.25, 1.0]))
     assert (share, other) == (pytest.approx(0.8), pytest.approx(0.2))
+
+
+def test_what_is_least_probable_together_is_left_out_first() -> None:
+    """Truth: the products by hand, 0.3, 0.1, 0.03 (both), 0.001 and so on."""
+    assert kept_causes([0.999, 0.9, 0.7]) == [(0, 1), (0, 2), (0,), (1, 2), (1,), (2,)]
+    assert kept_causes([0.6, 0.8]) == [(1,), (0,)]
+    assert kept_causes([1.0, 1.0, 0.5]) == [(0, 1), (0, 2), (1, 2), (0,), (1,), (2,)]  # ties: the larger ones first
+    assert kept_causes([0.9]) == kept_causes([]) == []
