@@ -19,15 +19,19 @@ from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, st
 _INTERVAL = 1.96
 
 
-def insignificant_sizes(fit: CandidateFit) -> tuple[int, ...]:
+def insignificant_sizes(fit: CandidateFit, errors: Array) -> tuple[int, ...]:
     """Entries of the parameter vector of a cause's sizes whose 95 % intervals hold the aircraft file's values.
 
-    They are found one at a time, the least significant first, the others free (backward elimination: Klein & Morelli
-    (2006), Aircraft System Identification, sect. 5.4). Each cause keeps its most significant size.
+    ``errors`` (K,) are the standard errors of the candidates' parameters as they are stated, which may be larger than
+    those of the fit; the correlations are the fit's. Sizes are found one at a time, the least significant first, the
+    others free (backward elimination: Klein & Morelli (2006), Aircraft System Identification, sect. 5.4). Each cause
+    keeps its most significant size.
     """
     simulator, chosen = fit.simulator, list(fit.indices)
     away = fit.values - simulator.neutral()[chosen]
     covariance = fit.covariance[: len(chosen), : len(chosen)]
+    larger = errors / np.sqrt(np.diag(covariance))
+    covariance = covariance * np.outer(larger, larger)
     held: list[int] = []
     while True:
         ratios = _ratios(away, covariance, held)

@@ -6,10 +6,11 @@ compared with its alternatives (``alternatives``), and those that are improbable
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted
 from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, Candidate, candidates_of
 from sysid_node.gap.estimation.checkpoint import Checkpoint
@@ -91,9 +92,12 @@ class Attribution:
         """The same causes with the sizes of least squares."""
         return replace(self, corrected=self.chosen.fit, size_source=None)
 
-    def without_insignificant_sizes(self) -> Attribution | None:
-        """The same causes with insignificant sizes at the file's values; none where all are significant."""
-        held = insignificant_sizes(self.size_fit)
+    def without_insignificant_sizes(self, errors: Callable[[CandidateFit], Array]) -> Attribution | None:
+        """The same causes with insignificant sizes at the file's values; none where all are significant.
+
+        ``errors`` returns the standard errors (unknowns,) of a fit as they are stated.
+        """
+        held = insignificant_sizes(self.size_fit, errors(self.size_fit)[: len(self.size_fit.indices)])
         if not held:
             return None
         moved = replace(self, corrected=restricted(self.size_fit, held), size_source=None, held=held)

@@ -22,6 +22,7 @@ from sysid_node.gap.validation.handed_on import of_corrected_file
 from sysid_node.gap.validation.kfold import kfold_evidence
 from sysid_node.gap.validation.simulation_error import simulation_gap, weather_suffices
 from sysid_node.gap.validation.spectral_error import Gap
+from sysid_node.gap.validation.standard_errors import scattered_errors
 from sysid_node.gap.validation.standing import (
     ErrorTable,
     attitude_errors,
@@ -198,7 +199,7 @@ def _without_insignificant_sizes(
     attribution: Attribution, checked: Check, validator: Validator
 ) -> tuple[Attribution, Check]:
     """The causes with insignificant sizes at the file's values, where all measures are at least as good."""
-    smaller = attribution.without_insignificant_sizes()
+    smaller = attribution.without_insignificant_sizes(scattered_errors)
     if smaller is None:
         return attribution, checked
     try:

@@ -32,11 +32,16 @@ def with_standard_error(name: str, value: float, error: float) -> list[float]:
 
 def standard_errors(fit: CandidateFit) -> Array:
     """Standard errors (unknowns,) by chance alone, of a fit of ``instruments.liml.liml_estimate``."""
+    errors = scattered_errors(fit)
+    for place in onset_places(fit):
+        errors[place] = onset_uncertainty(fit, place)
+    return errors
+
+
+def scattered_errors(fit: CandidateFit) -> Array:
+    """Standard errors (unknowns,) by chance alone of all but onsets."""
     steps = np.array([part[group].sum(axis=0) for model, part in zip(fit.models, influence(fit), strict=True)
                       for group in window_groups(model)])  # fmt: skip
     steps = steps - steps.mean(axis=0)
     scatter = (steps**2).sum(axis=0) * len(steps) / max(len(steps) - 1, 1)
-    errors = np.sqrt(np.maximum(np.diag(fit.covariance), scatter))
-    for place in onset_places(fit):
-        errors[place] = onset_uncertainty(fit, place)
-    return np.asarray(errors)
+    return np.asarray(np.sqrt(np.maximum(np.diag(fit.covariance), scatter)))

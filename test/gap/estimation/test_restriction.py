@@ -40,7 +40,15 @@ def _standing_at(start: CandidateFit, ratios: list[float]) -> CandidateFit:
     ],
 )
 def test_sizes_whose_intervals_hold_the_files_values_are_insignificant(start, ratios, held) -> None:
-    assert set(insignificant_sizes(_standing_at(start, ratios))) == {start.indices[k] for k in held}
+    fit = _standing_at(start, ratios)
+    assert set(insignificant_sizes(fit, np.full(6, 0.01))) == {start.indices[k] for k in held}
+
+
+def test_the_stated_standard_errors_decide(start) -> None:
+    """A size that is 2.1 standard errors of the fit away is 1.4 of those that are stated."""
+    fit = _standing_at(start, [5.0, 2.1, -2.9, 2.1, -8.0, 4.0])
+    stated = np.array([0.01, 0.015, 0.01, 0.01, 0.01, 0.01])
+    assert insignificant_sizes(fit, stated) == (fit.indices[1],)
 
 
 def test_of_two_sizes_that_stand_in_for_each_other_one_is_significant(start) -> None:
@@ -50,7 +58,8 @@ def test_of_two_sizes_that_stand_in_for_each_other_one_is_significant(start) -> 
     information[1, 2] = information[2, 1] = 0.95e4
     errors = np.sqrt(np.diag(np.linalg.inv(information)))[1:3]
     assert (fit.values[1:3] / errors < 1.96).all()
-    assert insignificant_sizes(replace(fit, information=information)) == (fit.indices[1],)
+    unlike = replace(fit, information=information)
+    assert insignificant_sizes(unlike, np.sqrt(np.diag(unlike.covariance))[:6]) == (fit.indices[1],)
 
 
 def test_all_else_is_where_it_is_best_without_what_is_held(start) -> None:

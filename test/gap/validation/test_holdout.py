@@ -38,7 +38,7 @@ class Explanation:
     def with_file_derivatives(self) -> "Explanation":
         return Explanation(-np.eye(2))  # predicts nothing
 
-    def without_insignificant_sizes(self) -> "Explanation | None":
+    def without_insignificant_sizes(self, _: object) -> "Explanation | None":
         return None if self.held is None else Explanation(self.held * np.eye(2))
 
     def without_causes(self) -> "Explanation":
