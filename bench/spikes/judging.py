@@ -91,12 +91,12 @@ def _sizes(effect: str, values: Mapping[str, float]) -> list[tuple[str, float]]:
 
 def _sized(found: Mapping[str, Sequence[float]], name: str, true: float) -> bool:
     """Whether a parameter's size is right; what acts on controls is stated for each of them, named after it."""
-    stated = [found[name]] if name in found else _lateness(found)
+    stated = [found[name]] if name in found else _by_control(found)
     return bool(stated) and all(_close(each, true) for each in stated)
 
 
-def _lateness(found: Mapping[str, Sequence[float]]) -> list[Sequence[float]]:
-    """Of each control its size, and of a lag of second order the time 2 zeta T by which a control comes late.
+def _by_control(found: Mapping[str, Sequence[float]]) -> list[Sequence[float]]:
+    """The size of each control; of a lag of second order the time 2 zeta T by which the control comes late.
 
     A lag that is put in before the record's own makes one of second order, whose lateness is the sum of both.
     """

@@ -46,6 +46,14 @@ def late_and_scaled(aircraft) -> Fitted:
 
 
 @pytest.fixture(scope="module")
+def mistaken(aircraft) -> Fitted:
+    """As ``late``, with effects that change derivatives, too."""
+    wanted = ("command_delay", "derivative_error of Cm", "imu_scale", "cg_shift", "mass_error", "inertia_error",
+              "thrust_scale", "airspeed_scale")  # fmt: skip
+    return _fitted(aircraft, {"command_delay": {"delay": 0.1}, "cg_shift": {"x": 0.02}}, 20, wanted)
+
+
+@pytest.fixture(scope="module")
 def stalling(aircraft) -> Fitted:
     """As ``late``, with a wing that stalls 8 chords of flight behind the angle of attack."""
     effect = {"stall_separation": {"depth": 1.0, "alpha_star": 0.17, "tau2": 8.0}}

@@ -56,3 +56,16 @@ def test_servos_of_second_order_are_told_from_a_lag_and_from_a_delay(oscillating
     chosen, _ = replace_stepwise(fitter, base, fitted[first], [list(fitted.values())], [])
     assert [candidate.label for candidate in chosen.fit.candidates] == [SECOND_ORDER]
     assert chosen.fit.values == pytest.approx([0.06, 0.7], rel=0.05)
+
+
+def test_wrong_derivatives_are_compared_with_every_effect_that_was_fitted_alone(mistaken) -> None:
+    """Another cause is compared with the likeliest of them only, and with what delays the response as it does."""
+    fitter, base, candidates = mistaken
+    names = ("imu_scale", "cg_shift", "mass_error", "inertia_error", "thrust_scale", "airspeed_scale")
+    first = [fitter.add_candidate(base, candidates[name]) for name in names]
+    delay = fitter.add_candidate(base, candidates["command_delay"])
+    both = fitter.add_candidate(delay, candidates["derivative_error of Cm"])
+    _, positions = replace_stepwise(fitter, base, both, [[*first, delay], [both]], [], frozenset(candidates))
+    tried = {each.candidate.effect: {a.added.label for a in each.alternatives} for each in positions}
+    assert tried["derivative_error"] >= set(names)
+    assert not tried["command_delay"] >= set(names)
