@@ -14,7 +14,12 @@ import numpy as np
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
 from sysid_node.gap.selection.acceptance import ComparisonTable, is_accepted
-from sysid_node.gap.selection.calibration import CauseEvidence, calibrated_probability, is_supported_but_misspecified
+from sysid_node.gap.selection.calibration import (
+    CauseEvidence,
+    calibrated_probability,
+    is_supported_but_misspecified,
+    probability_by_support,
+)
 from sysid_node.gap.selection.causes import Cause
 from sysid_node.gap.selection.comparison import Comparison
 from sysid_node.gap.selection.fitted_set import FittedSet
@@ -66,7 +71,13 @@ class RecordedDiagnosis:
         """What the search for causes decides by these scores: where it changes, other fits would be asked for."""
         kept = [cause for cause in self.causes if cause.kept]
         tables = [
-            CauseTable(c.label, c.share, c.alternative_share, calibrated_probability(c.evidence, thresholds))
+            CauseTable(
+                c.label,
+                c.share,
+                c.alternative_share,
+                calibrated_probability(c.evidence, thresholds),
+                probability_by_support(c.evidence, thresholds),
+            )
             for c in kept
         ]
         positions = [

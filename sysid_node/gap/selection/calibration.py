@@ -64,7 +64,7 @@ def misfit_of(tested: Misspecification, thresholds: Thresholds = THRESHOLDS) -> 
 
 def calibrated_probability(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> float:
     """Probability that the cause, or an alternative named with it, is there; zero where it is misspecified."""
-    return 0.0 if is_misspecified(evidence, thresholds) else _probability_by_support(evidence, thresholds)
+    return 0.0 if is_misspecified(evidence, thresholds) else probability_by_support(evidence, thresholds)
 
 
 def is_misspecified(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> bool:
@@ -74,7 +74,7 @@ def is_misspecified(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS
 
 def is_supported_but_misspecified(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> bool:
     """Whether the cause would be kept but for its misfit: then something is there, but not this effect."""
-    likely = _probability_by_support(evidence, thresholds) >= thresholds.calibration.probability
+    likely = probability_by_support(evidence, thresholds) >= thresholds.calibration.probability
     return is_misspecified(evidence, thresholds) and likely
 
 
@@ -93,7 +93,7 @@ def prior_odds(effect: str, thresholds: Thresholds = THRESHOLDS) -> float:
     return float(np.exp(limits.flexible)) if effect in limits.flexible_effects else 1.0
 
 
-def _probability_by_support(evidence: CauseEvidence, thresholds: Thresholds) -> float:
+def probability_by_support(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> float:
     """The larger of the logistic regression's probability and that by the tolerances, whatever the misfit."""
     log_odds = float(np.dot(thresholds.calibration.weights, regressors(evidence)))
     by_tolerances = evidence.by_tolerances - float(np.log(evidence.searched))

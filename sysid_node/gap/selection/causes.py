@@ -21,7 +21,13 @@ from sysid_node.gap.instruments.bayes_factor import log_bayes_factor, log_bayes_
 from sysid_node.gap.residuals.excited_axes import excited_windows
 from sysid_node.gap.selection.acceptance import is_plausible, is_relevant, nats_by_tolerances
 from sysid_node.gap.selection.alternatives import CauseAlternatives, replace_stepwise
-from sysid_node.gap.selection.calibration import CauseEvidence, calibrated_probability, evidence_of, prior_odds
+from sysid_node.gap.selection.calibration import (
+    CauseEvidence,
+    calibrated_probability,
+    evidence_of,
+    prior_odds,
+    probability_by_support,
+)
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison, derivative_shift, power_left
 from sysid_node.gap.selection.fitted_set import FittedSet
@@ -69,7 +75,8 @@ class Cause:
     def table(self) -> CauseTable:
         """The scores that decide whether it is kept."""
         largest = max((share for _, share in self.alternatives), default=0.0)
-        return CauseTable(self.candidate.label, self.share, largest, self.probability_of_any)
+        by_support = probability_by_support(self.evidence) if self.plausible else 0.0
+        return CauseTable(self.candidate.label, self.share, largest, self.probability_of_any, by_support)
 
 
 def select_causes(
@@ -78,13 +85,14 @@ def select_causes(
     chosen: FittedSet,
     stages: Sequence[list[FittedSet]],
     always: Sequence[Candidate],
+    doubted_before: Sequence[Cause] = (),
 ) -> tuple[FittedSet, tuple[Cause, ...], tuple[Cause, ...]]:
     """The explanation whose causes are all kept, these causes, the most probable first, and the doubted ones.
 
     ``chosen`` is the explanation of the forward selection with its ``stages``; candidates that are ``always`` tried
-    are alternatives to any cause. ``base`` has nuisances only.
+    are alternatives to any cause. ``base`` has nuisances only. What was ``doubted_before`` does not come back.
     """
-    doubted: list[Cause] = []
+    doubted = list(doubted_before)
     challenged: frozenset[str] = frozenset()
     while True:
         excluded = frozenset(cause.candidate.label for cause in doubted)

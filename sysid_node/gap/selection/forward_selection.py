@@ -2,6 +2,8 @@
 
 Candidates are added one at a time, up to three, each where it is accepted (``acceptance``). Then every cause is
 compared with its alternatives (``alternatives``), and those that are improbable are dropped or replaced (``causes``).
+Where some were, the selection goes on from those that are left, as stepwise regression does (Efroymson (1960), in
+Ralston & Wilf, Mathematical Methods for Digital Computers): beside a wrong cause the right one may not have been seen.
 """
 
 from __future__ import annotations
@@ -51,6 +53,11 @@ class Attribution:
     held_out: tuple[HeldOutFlight, ...] = ()
     size_source: CandidateFit | None = None  # of the sizes, where the corrected fit has the file's derivatives
     held: tuple[int, ...] = ()  # entries of causes' sizes that were held at the aircraft file's values
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The labels of its causes."""
+        return tuple(cause.candidate.label for cause in self.causes)
 
     @property
     def keeps_file_derivatives(self) -> bool:
@@ -138,11 +145,18 @@ def attribute(
     candidates = candidates_of(models[0].simulator, models)
     progress(0.0, "derivatives within their tolerances")
     base = fitter.fit_set(unfitted(models, nuisances), [])
-    chosen, stages = _forward(fitter, base, candidates, progress)
+    chosen, stages = _forward(fitter, base, base, candidates, progress)
     progress(0.8, "whether another effect would do as well")
     variants = {each.effect for each in chosen.fit.candidates if each.effect in SHARED}
     always = [each for each in candidates if each.effect in RESPONSE_DELAYS | variants]
     chosen, causes, doubted = select_causes(fitter, base, chosen, stages, always)
+    if causes and doubted:
+        progress(0.9, "what else there is in place of doubted causes")
+        left_out = {cause.candidate.label for cause in doubted}
+        rest = [each for each in candidates if each.label not in left_out]
+        larger, more = _forward(fitter, base, chosen, rest, lambda share, text: None)
+        if larger is not chosen:
+            chosen, causes, doubted = select_causes(fitter, base, larger, [*stages, *more], always, doubted)
     return Attribution(
         base=base,
         chosen=chosen,
@@ -158,16 +172,17 @@ def attribute(
 
 
 def _forward(
-    fitter: CandidateFitter, base: FittedSet, candidates: list[Candidate], progress: Progress
+    fitter: CandidateFitter, base: FittedSet, start: FittedSet, candidates: list[Candidate], progress: Progress
 ) -> tuple[FittedSet, list[list[FittedSet]]]:
-    """The explanation that forward selection ends with, and what was fitted in each stage, the best first.
+    """The explanation that forward selection from ``start`` ends with, and what each stage fitted, the best first.
 
     In each stage candidates are added to the best explanations of the stage before, of which the best need not be part
     of the best larger one. It goes on as long as a candidate is accepted, and the larger explanation may also take the
     best smaller one's place: what mends a poor explanation need not be worth another cause.
     """
-    best, frontier, stages = base, [base], list[list[FittedSet]]()
-    for count, (width, most) in enumerate(THRESHOLDS.search.stages):
+    best, frontier, stages = start, [start], list[list[FittedSet]]()
+    begun = len(start.fit.candidates)
+    for count, (width, most) in enumerate(THRESHOLDS.search.stages[begun:]):
         pairs = fitter.screen_upon(frontier[:width], candidates, _share_of(progress, count))
         fitted = fitter.fit_screened(best_screened(pairs, most), _share_of(progress, count))
         candidates = with_found_starts(candidates, [pair.screened for pair in pairs])

@@ -28,6 +28,7 @@ class CauseTable:
     share: float  # of the probability that it has together with its alternatives
     alternative_share: float  # the largest share of an alternative; zero without any
     probability: float  # calibrated, that the cause or an alternative named with it is there
+    by_support: float  # the same, were its equation not tested
 
 
 @dataclass(frozen=True)
@@ -78,16 +79,17 @@ def next_challenge(
 ) -> Challenge | None:
     """The cause to be challenged next; none where all are kept.
 
-    First the first cause with a likelier alternative, unless it was ``challenged`` before (labels); then the least
-    probable cause, where its probability is below the threshold.
+    First the first cause with a likelier alternative, unless it was ``challenged`` before (labels); then, of the causes
+    with a probability below the threshold, the one with the least support: a cause that is not there can be what makes
+    the equation of another look wrong.
     """
     for index, cause in enumerate(causes):
         if cause.alternative_share > cause.share and cause.label not in challenged:
             return Challenge(index, improbable=False)
-    least = min(range(len(causes)), key=lambda i: causes[i].probability, default=-1)
-    if causes and causes[least].probability < thresholds.calibration.probability:
-        return Challenge(least, improbable=True)
-    return None
+    improbable = [i for i, cause in enumerate(causes) if cause.probability < thresholds.calibration.probability]
+    if not improbable:
+        return None
+    return Challenge(min(improbable, key=lambda i: causes[i].by_support), improbable=True)
 
 
 def successor(

@@ -177,7 +177,8 @@ def _without_needless_causes(
 ) -> tuple[Attribution, Check]:
     """The explanation with the fewest causes that predicts at least as well by every measure, of these the best.
 
-    Only where no derivative moves in a cause's place: where all are the file's, or are no farther from it without it.
+    At least as well as each larger one that does, too. Only where no derivative moves in a cause's place: where all are
+    the file's, or are no farther from it without it.
     """
     filed = attribution.keeps_file_derivatives
     fewer = []
@@ -192,7 +193,14 @@ def _without_needless_causes(
                 fewer.extend([whole] if as_before and _stands(*whole) else [])
         except np.linalg.LinAlgError:
             continue
-    return min(fewer, key=lambda each: (len(each[0].causes), each[1].gaps[-1].after), default=(attribution, checked))
+    fewest = [each for each in fewer if all(is_needless(more.gaps, each[1].gaps) for more in _larger(each[0], fewer))]
+    return min(fewest, key=lambda each: (len(each[0].causes), each[1].gaps[-1].after), default=(attribution, checked))
+
+
+def _larger(attribution: Attribution, others: Sequence[tuple[Attribution, Check]]) -> list[Check]:
+    """The validations of those of other explanations that have all causes of one, and more."""
+    own = set(attribution.labels)
+    return [checked for other, checked in others if own < set(other.labels)]
 
 
 def _without_insignificant_sizes(

@@ -3,11 +3,18 @@
 Errors (rms, as shares of the motion) are those of the aircraft file (``before``), of the derivatives fitted within
 their tolerances (``tolerances``) and with the causes (``after``), by one or two measures: forces and kinematics by
 frequency, then short simulated flights where these can be simulated.
+
+A measure is the root mean square over channels, in which the worst channel counts most: nothing that mends the others
+is seen beside one that no cause of the list mends. The geometric mean over channels is seen, too. Its logarithm is the
+log likelihood per sample and channel, but for its sign, where the noise of each channel is unknown (Goodwin & Payne
+(1977), Dynamic System Identification, sect. 3.4; Klein & Morelli (2016), sect. 6.1).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -34,6 +41,10 @@ class Errors(Protocol):
     def after(self) -> float:
         """With the causes."""
 
+    @property
+    def per_channel(self) -> Mapping[str, Mapping[str, float]]:
+        """The same of each channel, by its name and by these names; empty of a single channel."""
+
 
 class ErrorTable(NamedTuple):
     """Errors by one measure as plain values."""
@@ -41,6 +52,7 @@ class ErrorTable(NamedTuple):
     before: float
     tolerances: float
     after: float
+    per_channel: Mapping[str, Mapping[str, float]] = MappingProxyType({})
 
 
 def causes_stand(
@@ -52,8 +64,9 @@ def causes_stand(
 ) -> bool:
     """Whether causes predict better than the derivatives by at least one measure, and than the file by every one.
 
-    Where they take away a large share of the error by one measure, they may tie with the file by another: one that
-    does not see what they change. In gusts that is often the whole of either; ``attitude`` are the errors of the
+    They also do where they take away a large share of the error by the geometric mean over channels. Where they take a
+    large share of the file's away by one measure, they may tie with the file by another: one that does not see what
+    they change. In gusts that is often the whole of either; ``attitude`` are the errors of the
     attitude by the gyroscopes, in which no gusts are. Where they take away much of the error of short flights, they may
     be worse by the other measure by as much as still halves the product of both errors, as fitted derivatives may.
 
@@ -63,9 +76,26 @@ def causes_stand(
     most = 1.0 if excused else thresholds.validation.unexcused
     limits = thresholds.validation
     seen = (*errors, *attitude)
-    large = any(e.after < limits.large_improvement * e.before for e in seen)
+    over_file, over_tolerances = (
+        any(channel_ratio(e, e, stage, thresholds) < limits.large_improvement for e in errors)
+        for stage in ("before", "tolerances")
+    )
+    large = over_file or any(e.after < limits.large_improvement * e.before for e in seen)
     worst = _worst(errors[-1].after, errors[-1].before, thresholds, otherwise=limits.tie if large else 1.0)
-    return any(e.after < most * e.tolerances for e in seen) and all(e.after < worst * e.before for e in errors)
+    better = over_tolerances or any(e.after < most * e.tolerances for e in seen)
+    return better and all(e.after < worst * e.before for e in errors)
+
+
+def channel_ratio(errors: Errors, others: Errors, stage: str = "after", thresholds: Thresholds = THRESHOLDS) -> float:
+    """Geometric mean over channels of the ratio of the errors with causes to other errors at a stage, by one measure.
+
+    Errors too small to be of interest count as if they were just of interest. One without common channels.
+    """
+    least = thresholds.acceptance.noticeable_error
+    both = errors.per_channel.keys() & others.per_channel.keys()
+    pairs = [(errors.per_channel[name]["after"], others.per_channel[name][stage]) for name in sorted(both)]
+    logs = [math.log(max(left, least) / max(other, least)) for left, other in pairs]
+    return math.exp(math.fsum(logs) / max(len(logs), 1))
 
 
 def file_predicts_better(errors: Sequence[Errors], thresholds: Thresholds = THRESHOLDS) -> bool:
@@ -90,12 +120,16 @@ def _worst(left: float, before: float, thresholds: Thresholds, *, otherwise: flo
     return max(limits.tie, limits.product * before / max(left, 1e-300))
 
 
-def is_needless(with_it: Sequence[Errors], without: Sequence[Errors]) -> bool:
+def is_needless(with_it: Sequence[Errors], without: Sequence[Errors], thresholds: Thresholds = THRESHOLDS) -> bool:
     """Whether flight that was not fitted is predicted at least as well without a cause, by every measure.
 
-    What a cause explains of the flights fitted, and of no other flight, is an error of the model there.
+    What a cause explains of the flights fitted, and of no other flight, is an error of the model there. By the
+    geometric mean over channels the errors may tie. Where no short flight can be simulated without the cause, it is
+    needed; where none can with it, it is judged by frequency alone.
     """
-    return all(less.after <= more.after for less, more in zip(without, with_it, strict=True))
+    tie, pairs = thresholds.validation.tie, zip(without, with_it, strict=False)
+    as_well = all(less.after <= more.after and channel_ratio(less, more) <= tie for less, more in pairs)
+    return as_well and len(without) >= len(with_it)
 
 
 def file_derivatives_suit_causes(

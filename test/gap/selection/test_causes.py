@@ -26,6 +26,16 @@ def test_the_true_effect_is_the_cause(selected, late) -> None:
     assert cause.without is late[1]
 
 
+def test_what_was_doubted_before_does_not_come_back(selected, late) -> None:
+    """The search goes on without it: the lag, which the late commands replaced, keeps its place or gives it up."""
+    fitter, base, candidates = late
+    _, (cause,), _ = selected
+    lag = fitter.add_candidate(base, candidates["actuator_lag"])
+    chosen, causes, doubted = select_causes(fitter, base, lag, [[lag]], [candidates["command_delay"]], [cause])
+    assert doubted[0] is cause
+    assert "command_delay" not in chosen.fit.effects | {each.candidate.effect for each in causes}
+
+
 def test_its_probability_is_its_share_of_the_calibrated_one(selected) -> None:
     _, (cause,), _ = selected
     assert cause.share > 0.95 and cause.share + sum(p for _, p in cause.alternatives) <= 1.0 + 1e-12

@@ -27,8 +27,8 @@ ACCEPTED = ComparisonTable(
 )  # fmt: skip
 LIKELY = THRESHOLDS.calibration.probability
 
-LAG = CauseTable("actuator_lag", share=0.9, alternative_share=0.1, probability=0.95)
-MASS = CauseTable("mass_error", share=0.8, alternative_share=0.2, probability=0.7)
+LAG = CauseTable("actuator_lag", share=0.9, alternative_share=0.1, probability=0.95, by_support=0.95)
+MASS = CauseTable("mass_error", share=0.8, alternative_share=0.2, probability=0.7, by_support=0.7)
 
 
 def test_probable_causes_are_kept() -> None:
@@ -64,10 +64,19 @@ def test_boundary_of_the_probability(change: float, challenged: bool) -> None:
 
 
 @pytest.mark.parametrize(("probabilities", "index"), [((0.3, 0.2), 1), ((0.2, 0.3), 0), ((0.2, 0.2), 0)])
-def test_the_least_probable_cause_is_challenged(probabilities: tuple[float, float], index: int) -> None:
+def test_the_improbable_cause_with_the_least_support_is_challenged(
+    probabilities: tuple[float, float], index: int
+) -> None:
     """In a tie the first."""
-    causes = [replace(LAG, probability=p) for p in probabilities]
+    causes = [replace(LAG, probability=p, by_support=p) for p in probabilities]
     assert next_challenge(causes) == Challenge(index, improbable=True)
+
+
+def test_a_supported_cause_whose_equation_looks_wrong_waits_until_unsupported_ones_are_gone() -> None:
+    """One of these may be what makes it look wrong; a probable cause is not challenged at all."""
+    refuted, weak = replace(LAG, probability=0.0, by_support=0.99), replace(MASS, probability=0.4, by_support=0.4)
+    assert next_challenge([refuted, weak]) == Challenge(1, improbable=True)
+    assert next_challenge([refuted]) == next_challenge([refuted, MASS]) == Challenge(0, improbable=True)
 
 
 def test_an_improbable_cause_is_challenged_however_often() -> None:

@@ -25,12 +25,18 @@ class Explanation:
     keeps_file_derivatives: bool = False
     strained: bool = False  # the derivatives, more than with more causes
     held: float | None = None  # with its insignificant sizes held at the file's values; none where it has none
+    named: tuple["Explanation", ...] = ()  # those with fewer causes, where which are left matters
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return self.causes
 
     def by_least_squares(self) -> "Explanation":
         return Explanation(self.chosen.fit)
 
     def with_fewer_causes(self) -> Iterator["Explanation"]:
-        return (Explanation(size * np.eye(2), strained=self.strained) for size in self.smaller)
+        yield from self.named
+        yield from (Explanation(size * np.eye(2), strained=self.strained) for size in self.smaller)
 
     def has_less_plausible_derivatives_than(self, larger: "Explanation") -> bool:
         return self.strained
@@ -48,7 +54,7 @@ class Explanation:
 def by_cholesky(explanation: Explanation, *_: object) -> SimpleNamespace:
     """The larger, the better it predicts; 3 is as good as the file, for which 1.5 are the derivatives alone."""
     size = float(np.linalg.cholesky(explanation.corrected)[0, 0] ** 2)
-    gaps = [SimpleNamespace(before=3.0, tolerances=1.5, after=3.0 / size)]
+    gaps = [SimpleNamespace(before=3.0, tolerances=1.5, after=3.0 / size, per_channel={})]
     return SimpleNamespace(gaps=gaps, attitude={}, size=size)
 
 
@@ -94,6 +100,17 @@ def test_a_cause_without_which_other_flight_is_predicted_no_worse_is_left_out(
     found, checked = standing_explanation(explanation, by_cholesky)
     assert checked.size == pytest.approx(stands)
     assert len(found.causes) == (1 if not strained and max(without) >= 9.0 else 2)
+
+
+@pytest.mark.parametrize(("alone", "stands"), [(9.5, ("delay", "bias")), (10.0, ("delay",)), (10.5, ("delay",))])
+def test_a_cause_is_left_out_where_the_better_explanation_does_not_miss_it(
+    alone: float, stands: tuple[str, ...]
+) -> None:
+    """A needless cause that spoils the whole explanation does not excuse another one's absence."""
+    fewer = (Explanation(10.0 * np.eye(2), causes=("delay", "bias")), Explanation(alone * np.eye(2), causes=("delay",)))
+    whole = Explanation(9.0 * np.eye(2), causes=("delay", "bias", "spoils"), named=fewer)
+    found, _ = standing_explanation(whole, by_cholesky)
+    assert found.causes == stands
 
 
 @pytest.mark.parametrize("held", [-1.0, 8.9, None])

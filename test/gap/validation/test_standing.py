@@ -11,6 +11,7 @@ from sysid_node.gap.validation.standing import (
     attitude_errors,
     causes_exceed_weather,
     causes_stand,
+    channel_ratio,
     file_derivatives_suit_causes,
     file_predicts_better,
     is_needless,
@@ -117,6 +118,42 @@ def test_a_tie_by_frequency_does_not_keep_a_file_that_flies_far_off(
 )
 def test_a_cause_is_needless_where_no_measure_is_worse_without_it(without: tuple[float, ...], needless: bool) -> None:
     assert is_needless([GOOD, GOOD], [GOOD._replace(after=after) for after in without]) is needless
+
+
+def by_channel(before: float, tolerances: float, after: float, **channels: tuple[float, float, float]) -> ErrorTable:
+    """Errors overall and of channels, each before, within tolerances and after."""
+    stages = ("before", "tolerances", "after")
+    table = {name: dict(zip(stages, errors, strict=True)) for name, errors in channels.items()}
+    return ErrorTable(before, tolerances, after, table)
+
+
+def test_the_ratio_over_channels_is_their_geometric_mean() -> None:
+    """Common channels alone count, and errors that are too small to be of interest as if they were just of interest."""
+    small = THRESHOLDS.acceptance.noticeable_error
+    errors = by_channel(0.5, 0.4, 0.3, p=(0.8, 0.4, 0.1), r=(0.5, 0.5, 1.0), psi=(small, 0.2 * small, 0.1 * small))
+    assert channel_ratio(errors, errors, "before") == pytest.approx((0.125 * 2.0) ** (1.0 / 3.0))
+    assert channel_ratio(errors, errors, "tolerances") == pytest.approx((0.25 * 2.0) ** (1.0 / 3.0))
+    other = by_channel(0.5, 0.4, 0.3, p=(0.8, 0.4, 0.3), beta=(0.1, 0.1, 0.1))
+    assert channel_ratio(errors, other) == pytest.approx(1.0 / 3.0)
+    assert channel_ratio(errors, GOOD) == 1.0
+
+
+def test_what_mends_most_channels_is_not_missed_beside_one_that_nothing_mends() -> None:
+    """Truth: a lag of 0.07 s in the record of a simulated light transport, whose yaw no derivatives predict."""
+    by_frequency = by_channel(0.516, 0.365, 0.516, Cl=(0.867, 0.47, 0.092), CY=(0.22, 0.15, 0.24),
+                              beta=(0.63, 0.44, 0.57), Cn=(0.891, 0.66, 1.238), phi=(0.33, 0.22, 0.091))  # fmt: skip
+    flown = by_channel(0.591, 0.465, 0.435, p=(0.53, 0.32, 0.107), r=(0.8, 0.56, 0.61), ay=(0.57, 0.4, 0.48))
+    assert causes_stand([by_frequency, flown])
+    assert not causes_stand([each._replace(per_channel={}) for each in (by_frequency, flown)])
+    yaw_alone = by_channel(0.516, 0.337, 0.337, Cl=(0.867, 0.47, 0.477), CY=(0.22, 0.15, 0.15), beta=(0.63, 0.44, 0.44),
+                           Cn=(0.891, 0.66, 0.66), phi=(0.33, 0.22, 0.22))  # fmt: skip
+    assert not is_needless([by_frequency], [yaw_alone])
+    assert is_needless([by_frequency], [yaw_alone._replace(per_channel={})])
+
+
+def test_a_cause_without_which_no_short_flight_can_be_simulated_is_needed() -> None:
+    assert not is_needless([GOOD, GOOD], [GOOD])
+    assert is_needless([GOOD], [GOOD, GOOD._replace(after=9.0)])
 
 
 @pytest.mark.parametrize(("after", "suit"), [(0.3, True), (0.4, False), (0.5, False)])
