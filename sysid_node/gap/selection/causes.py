@@ -79,6 +79,10 @@ class Cause:
         return CauseTable(self.candidate.label, self.share, largest, self.probability_of_any, by_support)
 
 
+#: An explanation, its causes, and the doubted ones.
+Selection = tuple[FittedSet, tuple[Cause, ...], tuple[Cause, ...]]
+
+
 def select_causes(
     fitter: CandidateFitter,
     base: FittedSet,
@@ -86,7 +90,7 @@ def select_causes(
     stages: Sequence[list[FittedSet]],
     always: Sequence[Candidate],
     doubted_before: Sequence[Cause] = (),
-) -> tuple[FittedSet, tuple[Cause, ...], tuple[Cause, ...]]:
+) -> Selection:
     """The explanation whose causes are all kept, these causes, the most probable first, and the doubted ones.
 
     ``chosen`` is the explanation of the forward selection with its ``stages``; candidates that are ``always`` tried

@@ -28,7 +28,7 @@ from sysid_node.gap.instruments.overidentification import (
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.selection.acceptance import is_accepted, nats_by_tolerances, predicts_better, relieves
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress, in_parallel
-from sysid_node.gap.selection.causes import Cause, select_causes
+from sysid_node.gap.selection.causes import Cause, Selection, select_causes
 from sysid_node.gap.selection.comparison import Comparison, derivative_shift
 from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.retention import kept_causes
@@ -149,14 +149,9 @@ def attribute(
     progress(0.8, "whether another effect would do as well")
     variants = {each.effect for each in chosen.fit.candidates if each.effect in SHARED}
     always = [each for each in candidates if each.effect in RESPONSE_DELAYS | variants]
-    chosen, causes, doubted = select_causes(fitter, base, chosen, stages, always)
-    if causes and doubted:
-        progress(0.9, "what else there is in place of doubted causes")
-        left_out = {cause.candidate.label for cause in doubted}
-        rest = [each for each in candidates if each.label not in left_out]
-        larger, more = _forward(fitter, base, chosen, rest, lambda share, text: None)
-        if larger is not chosen:
-            chosen, causes, doubted = select_causes(fitter, base, larger, [*stages, *more], always, doubted)
+    selection = select_causes(fitter, base, chosen, stages, always)
+    progress(0.9, "what else there is in place of doubted causes")
+    chosen, causes, doubted = _selected_again(fitter, base, selection, stages, candidates, always)
     return Attribution(
         base=base,
         chosen=chosen,
@@ -171,8 +166,32 @@ def attribute(
     )
 
 
+def _selected_again(
+    fitter: CandidateFitter,
+    base: FittedSet,
+    first: Selection,
+    stages: Sequence[list[FittedSet]],
+    candidates: Sequence[Candidate],
+    always: Sequence[Candidate],
+) -> Selection:
+    """A selection after the search went on without the doubted causes; the first one where that predicts no better.
+
+    It goes on from causes that are kept: without any, every candidate has been tried alone.
+    """
+    chosen, causes, doubted = first
+    left_out = {cause.candidate.label for cause in doubted}
+    if not causes or not doubted:
+        return first
+    rest = [each for each in candidates if each.label not in left_out]
+    larger, more = _forward(fitter, base, chosen, rest, lambda share, text: None)
+    if larger is chosen:
+        return first
+    again = select_causes(fitter, base, larger, [*stages, *more], always, doubted)
+    return again if predicts_better(Comparison(base, chosen, again[0]).probability) else first
+
+
 def _forward(
-    fitter: CandidateFitter, base: FittedSet, start: FittedSet, candidates: list[Candidate], progress: Progress
+    fitter: CandidateFitter, base: FittedSet, start: FittedSet, candidates: Sequence[Candidate], progress: Progress
 ) -> tuple[FittedSet, list[list[FittedSet]]]:
     """The explanation that forward selection from ``start`` ends with, and what each stage fitted, the best first.
 
