@@ -141,8 +141,11 @@ def file_derivatives_suit_causes(
 ) -> bool:
     """Whether causes predict better with the file's derivatives than with the fitted ones, by the last measure.
 
-    ``clearly``: by more than a tie, which is asked for where without causes the fitted ones predict better.
+    ``clearly``: by more than a tie, which is asked for where without causes the fitted ones predict better. Where short
+    flights can be simulated with one of the two alone, that one predicts better.
     """
+    if len(with_file) != len(with_fitted):
+        return len(with_file) > len(with_fitted)
     least = thresholds.validation.tie if clearly else 1.0
     return with_file[-1].after * least < with_fitted[-1].after
 

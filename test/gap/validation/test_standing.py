@@ -163,6 +163,13 @@ def test_the_last_measure_decides_on_the_derivatives(after: float, suit: bool) -
     assert file_derivatives_suit_causes([GOOD._replace(after=9.0), GOOD._replace(after=after)], fitted) is suit
 
 
+def test_derivatives_with_which_no_short_flight_can_be_simulated_do_not_suit() -> None:
+    """An error by frequency is no measure for one of short flights."""
+    flies, diverges = [GOOD, GOOD._replace(after=0.4)], [GOOD]
+    assert not file_derivatives_suit_causes(diverges, flies)
+    assert file_derivatives_suit_causes(flies, diverges)
+
+
 @pytest.mark.parametrize(("after", "suit"), [(0.37, True), (0.39, False), (0.4, False)])
 def test_where_fitted_derivatives_predict_better_without_causes_the_file_must_lead_by_more_than_a_tie(
     after: float, suit: bool
