@@ -5,9 +5,9 @@ their tolerances (``tolerances``) and with the causes (``after``), by one or two
 frequency, then short simulated flights where these can be simulated.
 
 A measure is the root mean square over channels, in which the worst channel counts most: nothing that mends the others
-is seen beside one that no cause of the list mends. The geometric mean over channels is seen, too. Its logarithm is the
-log likelihood per sample and channel, but for its sign, where the noise of each channel is unknown (Goodwin & Payne
-(1977), Dynamic System Identification, sect. 3.4; Klein & Morelli (2016), sect. 6.1).
+is seen beside one that no cause of the list mends. The geometric mean over channels is seen, too. Up to a
+constant its logarithm is the negative log likelihood per sample and channel of white noise whose variance is unknown in
+each channel (Klein & Morelli (2016), Aircraft System Identification, ch. 6).
 """
 
 from __future__ import annotations
@@ -127,9 +127,9 @@ def is_needless(with_it: Sequence[Errors], without: Sequence[Errors], thresholds
     geometric mean over channels the errors may tie. Where no short flight can be simulated without the cause, it is
     needed; where none can with it, it is judged by frequency alone.
     """
-    tie, pairs = thresholds.validation.tie, zip(without, with_it, strict=False)
-    as_well = all(less.after <= more.after and channel_ratio(less, more) <= tie for less, more in pairs)
-    return as_well and len(without) >= len(with_it)
+    pairs = list(zip(without, with_it, strict=False))
+    ties = (channel_ratio(less, more, thresholds=thresholds) <= thresholds.validation.tie for less, more in pairs)
+    return len(without) >= len(with_it) and all(less.after <= more.after for less, more in pairs) and all(ties)
 
 
 def file_derivatives_suit_causes(
