@@ -26,7 +26,7 @@ from sysid_msgs.msg import AirData
 
 from sysid_node.errors import InputError
 from sysid_node.flight.autopilots.attitude import Attitude
-from sysid_node.flight.autopilots.base import AdapterSettings, ImuSample, Sample, header_ns
+from sysid_node.flight.autopilots.base import AdapterSettings, AirSample, ImuSample, JointSample, Sample, header_ns
 from sysid_node.flight.autopilots.mavros import IMU, PRESSURE, Mavros
 from sysid_node.flight.autopilots.px4 import Px4
 from sysid_node.flight.frames import euler_from_quaternion, quaternion_from_euler
@@ -141,11 +141,12 @@ def test_whatever_a_px4_sends_has_samples(values: list[float], stamps: tuple[int
     air = {"airspeed_source": source, "true_airspeed_m_s": values[9]}
     constant = {"RELATIVE_TIMESTAMP_INVALID": 2**31 - 1}
     message = SimpleNamespace(q=[1.0, 0.0, 0.0, 0.0], **both, **imu, **air, **constant)
-    for topic in px4.topics:
-        px4.hear(topic, message)
-    message.timestamp = message.timestamp_sample
-    for topic in px4.topics:
-        px4.hear(topic, message)
+    for stamp in stamps:
+        message.timestamp = stamp
+        heard = [px4.hear(topic, message) for topic in px4.topics]
+        samples = [sample for sample in heard if sample is not None]
+        assert [type(sample) for sample in samples] == [ImuSample, AirSample, JointSample]
+        assert {sample.stamp_ns for sample in samples} == {1000 * stamp}
 
 
 def test_a_stamp_that_ros_cannot_hold_is_said(standard: tuple[AdapterNode, Any, Any], probe: Probe, capfd: Any) -> None:
