@@ -64,34 +64,16 @@ class ChangeMonitor:
     outside_model: Flags | None = None  # (C,)
     contradicted_by_excited: Flags | None = None  # (C,) by what was learned in well-excited flight
     examinations: int = 0
-    with_earlier_columns: ReferenceEstimates | None = None  # the present estimates, before a control's column moved
 
     def before_examination(self) -> ChangeMonitor:
         """The same with what the next examination finds left out; pieces and references are shared."""
         typical = deque(self.typical_statistic, maxlen=self.typical_statistic.maxlen)
         return replace(self, typical_statistic=typical, contradicted=dict(self.contradicted))
 
-    def move_columns(self, now: float) -> None:
-        """The controls' columns in the equations change at ``now`` (s), because a servo's time does.
-
-        Earlier estimates were made with the columns before. How far the change moves the present estimates is known
-        when they are solved for again (``add_reference``).
-        """
-        last = self.references.pop() if self.references and self.references[-1].time == now else None
-        self.with_earlier_columns = last
-        if last is None:
-            self.references.clear()
-
     def add_reference(self, reference: ReferenceEstimates) -> None:
-        """Add the present estimates. Where columns have just changed, all earlier estimates move as these did."""
-        before, self.with_earlier_columns = self.with_earlier_columns, None
-        if before is not None and before.equations is reference.equations:
-            alike = [one for one in self.references if one.equations is reference.equations]
-            known = [one.moved_as(before, reference) for one in alike]
-            self.references.clear()
-            self.references.extend(known)
-        elif before is not None:
-            self.references.clear()
+        """Add the present estimates, in place of those that were made of the same flight before."""
+        if self.references and self.references[-1].time == reference.time:
+            self.references.pop()
         self.references.append(reference)
 
     def standing(self, C: int) -> ChangeDecision:
@@ -130,7 +112,7 @@ class ChangeTests:
     def contradictions(self, spans: Iterable[int]) -> Iterator[tuple[int, ScoreTest]]:
         """How the last pieces contradict the estimates from before them: of the ``spans`` (rising) that have such."""
         known = list(_stretches(self.change_monitor, self.change_monitor.pieces, self.now, spans))
-        return zip(spans, _tested(known, self.model, self.spectrum), strict=False)
+        return zip(spans, _tested(known, self.spectrum), strict=False)
 
 
 class _Stretch(NamedTuple):
@@ -142,16 +124,16 @@ class _Stretch(NamedTuple):
     before: ReferenceEstimates
 
     @property
-    def kind(self) -> tuple[int, bool]:
-        """What stretches have in common that are tested at once: equations, and whether lines are corrected."""
-        return id(self.before.equations), self.before.correction is not None
+    def kind(self) -> tuple[int, int, bool]:
+        """What stretches have in common that are tested at once: equations, servos, whether lines are corrected."""
+        return id(self.before.equations), id(self.before.model), self.before.correction is not None
 
-    def corrected(self, model: InstrumentModel | None, spectrum: Spectrum) -> CorrectedLines:
+    def corrected(self, spectrum: Spectrum) -> CorrectedLines:
         """Clean lines, corrected as those are that the estimates are of."""
         known = self.before
         assert known.correction is not None
         return known.correction.correct(
-            self.part, model, spectrum.omega, (self.start, self.end), known.equations, known.solution.theta
+            self.part, known.model, spectrum.omega, (self.start, self.end), known.equations, known.solution.theta
         )
 
 
@@ -173,16 +155,19 @@ def _stretches(
         yield _Stretch(start, end, _summed(pieces, span), known)
 
 
-def _tested(stretches: Sequence[_Stretch], model: InstrumentModel | None, spectrum: Spectrum) -> Iterator[ScoreTest]:
-    """How each contradicts the estimates from before it; those by the same equations at once."""
-    for (_, corrected), some in groupby(stretches, key=lambda stretch: stretch.kind):
+def _tested(stretches: Sequence[_Stretch], spectrum: Spectrum) -> Iterator[ScoreTest]:
+    """How each contradicts the estimates from before it; those by the same equations at once.
+
+    The controls are where the servos had them with which the estimates were made. They may be others by now.
+    """
+    for (*_, corrected), some in groupby(stretches, key=lambda stretch: stretch.kind):
         stretched = list(some)
         duration = np.array([stretch.end - stretch.start for stretch in stretched])
         reference = ReferenceEstimates.stacked([stretch.before for stretch in stretched])
         if corrected:
-            lines, errors = map(np.array, zip(*(one.corrected(model, spectrum) for one in stretched), strict=True))
+            lines, errors = map(np.array, zip(*(one.corrected(spectrum) for one in stretched), strict=True))
         else:
-            lines, errors = clean_lines(np.array([stretch.part for stretch in stretched]), model), None
+            lines, errors = clean_lines(np.array([stretch.part for stretch in stretched]), reference.model), None
         yield from score_test(reference, lines, spectrum, duration, errors).each()
 
 

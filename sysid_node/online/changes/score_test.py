@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any
 
@@ -33,6 +33,7 @@ from scipy.linalg.lapack import dposv
 from scipy.special import fdtrc
 
 from sysid_node.online.regression.information import Spectrum
+from sysid_node.online.regression.instruments import InstrumentModel
 from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.systematic.corrected_lines import LineCorrection
@@ -55,6 +56,7 @@ class ReferenceEstimates:
     equations: NormalEquations
     solution: Solution
     uncertainty: Uncertainty
+    model: InstrumentModel | None = None  # by which the lines were made of the transform: servos, instruments
     noise_score: Array | None = None  # (P, C) the score's mean by the sensors' noise, per line and second; None: zero
     time_errors: Array | None = None  # (P,) standard errors of the regressors' times, s; None: all are exact
     inflation: Array | None = None  # (C,) factors of the covariance by gusts that the controls answer; None: one
@@ -62,21 +64,9 @@ class ReferenceEstimates:
     correction: LineCorrection | None = None  # of the lines that the estimates are of; None: they are as recorded
     corrected: ReferenceEstimates | None = None  # the same estimates by corrected lines; None: there are none
 
-    def moved_as(self, before: ReferenceEstimates, after: ReferenceEstimates) -> ReferenceEstimates:
-        """The same with estimates that differ as those ``before`` and ``after`` a servo's columns moved."""
-        by, corrected = after.solution.theta - before.solution.theta, None
-        if self.corrected is not None and before.corrected is not None and after.corrected is not None:
-            corrected = self.corrected.moved_as(before.corrected, after.corrected)
-        return replace(
-            self,
-            solution=replace(self.solution, theta=self.solution.theta + by),
-            correction=self.correction and self.correction.without_servos(),
-            corrected=corrected,
-        )
-
     @classmethod
     def stacked(cls, some: Sequence[ReferenceEstimates]) -> ReferenceEstimates:
-        """Estimates by the same equations with an axis in front."""
+        """Estimates by the same equations and of lines made alike, with an axis in front."""
         solution = Solution(*_columns([one.solution for one in some]))
         uncertainty = Uncertainty(*_columns([one.uncertainty for one in some]))
         scores = [one.noise_score if one.noise_score is not None else np.zeros_like(one.solution.theta) for one in some]
@@ -88,6 +78,7 @@ class ReferenceEstimates:
             some[0].equations,
             solution,
             uncertainty,
+            some[0].model,
             np.array(scores),
             np.array(times),
             np.array([none if one.inflation is None else one.inflation for one in some]),

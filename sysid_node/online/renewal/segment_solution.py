@@ -16,7 +16,6 @@ from sysid_node.online.regression import (
 from sysid_node.online.regression.actuator_lag_test import LagTest
 from sysid_node.online.regression.information import Information
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
-from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.renewal.segment_information import finished_information, line_seconds
 from sysid_node.online.renewal.solved_equations import SolvedEquations, solved_equations
 from sysid_node.online.state import (
@@ -56,10 +55,10 @@ def solve_all(
     total = recorded if signals is None else signals.information
     gram = total.grams.sum(axis=0)
     found = solved_equations(state, total, gram)
-    equations, spread, now = state.equations, found.spread, state.transform.last
-    before = corrected = _reference(found, found.solution, spread, equations, now)
+    spread, now = found.spread, state.transform.last
+    before = corrected = _reference(state, found, found.solution, spread)
     if signals is not None:
-        before = _with_recorded_signals(equations, recorded, found, now)
+        before = _with_recorded_signals(state, recorded, found)
         yield
     systematic = yield from _systematic(state, signals, found, before.solution, at[1] if at else None)
     yield
@@ -123,20 +122,21 @@ def _variance_factors(found: SolvedEquations, recorded: Solution, systematic: Sy
     return np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
 
 
-def _with_recorded_signals(
-    equations: NormalEquations, recorded: Information, found: SolvedEquations, now: float
-) -> ReferenceEstimates:
+def _with_recorded_signals(state: EstimatorState, recorded: Information, found: SolvedEquations) -> ReferenceEstimates:
     """The solution with the signals as they were recorded, for estimates between renewals and short stretches."""
+    equations = state.equations
     solution = least_squares.solve(equations, recorded.grams.sum(axis=0), found.compensation)
-    return _reference(found, solution, least_squares.uncertainty(equations, solution, recorded), equations, now)
+    return _reference(state, found, solution, least_squares.uncertainty(equations, solution, recorded))
 
 
 def _reference(
-    found: SolvedEquations, solution: Solution, spread: Uncertainty, equations: NormalEquations, now: float
+    state: EstimatorState, found: SolvedEquations, solution: Solution, spread: Uncertainty
 ) -> ReferenceEstimates:
     """What later flight is tested against."""
+    equations, now = state.equations, state.transform.last
     noise = None if found.noise is None else regressor_noise.noise_score(equations, solution, found.noise)
-    return ReferenceEstimates(now, equations, solution, spread, noise, inflation=found.inflation)
+    model = state.controls.line_model
+    return ReferenceEstimates(now, equations, solution, spread, model, noise, inflation=found.inflation)
 
 
 def _corrected_signals(

@@ -62,8 +62,6 @@ def _look_at(
     """Renew the estimates with the signals corrected as in ``place``, and a ``share`` of the step from there."""
     if state.controls.servos is not place.lines:
         yield from move_servos(state, place.lines)
-    else:
-        state.changes.monitor.references.pop()
     yield from solve_all(state, measure_segment(state, lines), (place, share))
     return last_errors(state)
 
@@ -97,4 +95,3 @@ def move_servos(state: EstimatorState, servos: ServoModel) -> Steps[None]:
     for excited in state.changes.excited:
         segments = [replace(segment, information=found[id(segment.information)]) for segment in excited.segments]
         excited.segments = deque(segments, maxlen=excited.segments.maxlen)
-    state.changes.monitor.move_columns(state.transform.last)

@@ -6,7 +6,7 @@ estimates that were made with corrected signals.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -44,12 +44,6 @@ class LineCorrection:
     estimate: Array  # (K,) of the imperfections, to be taken out
     covariance: Array  # (K, K) of the imperfections
     jacobian: Array  # (K, C, P) what they do to the slopes of C coefficients
-
-    def without_servos(self) -> LineCorrection:
-        """The same for lines whose controls have been moved by what was to be taken out of the servos."""
-        estimate = self.estimate.copy()
-        estimate[self.imperfect.servos.start :] = 0.0
-        return replace(self, estimate=estimate)
 
     def correct(
         self,
