@@ -104,13 +104,5 @@ def test_errors_are_those_of_residuals_when_an_imperfection_is_another(key):
     np.testing.assert_allclose(sign * errors, difference, atol=1e-3 * np.abs(difference).max())
 
 
-def test_servos_whose_columns_have_moved_are_not_taken_out_again():
-    correction, _ = known(flown())
-    moved = correction.without_servos()
-    first = correction.imperfect.servos.start
-    np.testing.assert_array_equal(moved.estimate[:first], correction.estimate[:first])
-    assert not moved.estimate[first:].any()
-
-
 def test_without_tolerances_nothing_is_corrected():
     assert flown(True).changes.monitor.references[-1].corrected is None
