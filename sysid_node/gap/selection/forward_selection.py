@@ -147,9 +147,11 @@ def attribute(
     base = fitter.fit_set(unfitted(models, nuisances), [])
     chosen, stages = _forward(fitter, base, base, candidates, progress)
     progress(0.8, "whether another effect would do as well")
-    selection = select_causes(fitter, base, chosen, stages, _always_tried(chosen, candidates))
+    variants = {each.effect for each in chosen.fit.candidates if each.effect in SHARED}
+    always = [each for each in candidates if each.effect in RESPONSE_DELAYS | variants]
+    selection = select_causes(fitter, base, chosen, stages, always)
     progress(0.9, "what else there is in place of doubted causes")
-    chosen, causes, doubted = _selected_again(fitter, base, selection, stages, candidates)
+    chosen, causes, doubted = _selected_again(fitter, base, selection, stages, candidates, always)
     return Attribution(
         base=base,
         chosen=chosen,
@@ -164,18 +166,13 @@ def attribute(
     )
 
 
-def _always_tried(chosen: FittedSet, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates that are tried in place of any cause: what delays the response, and variants of what is chosen."""
-    variants = {each.effect for each in chosen.fit.candidates if each.effect in SHARED}
-    return [each for each in candidates if each.effect in RESPONSE_DELAYS | variants]
-
-
 def _selected_again(
     fitter: CandidateFitter,
     base: FittedSet,
     first: Selection,
     stages: Sequence[list[FittedSet]],
     candidates: Sequence[Candidate],
+    always: Sequence[Candidate],
 ) -> Selection:
     """A selection after the search went on without the doubted causes; the first one where that predicts no better.
 
@@ -189,7 +186,7 @@ def _selected_again(
     larger, more = _forward(fitter, base, chosen, rest, lambda share, text: None)
     if larger is chosen:
         return first
-    again = select_causes(fitter, base, larger, [*stages, *more], _always_tried(larger, candidates), doubted)
+    again = select_causes(fitter, base, larger, [*stages, *more], always, doubted)
     return again if predicts_better(Comparison(base, chosen, again[0]).probability) else first
 
 
@@ -205,7 +202,7 @@ def _forward(
     best, frontier, stages = start, [start], list[list[FittedSet]]()
     begun = len(start.fit.candidates)
     for count, (width, most) in enumerate(THRESHOLDS.search.stages[begun:]):
-        pairs = fitter.screen_upon(_without_variants(frontier[:width]), candidates, _share_of(progress, count))
+        pairs = fitter.screen_upon(frontier[:width], candidates, _share_of(progress, count))
         fitted = fitter.fit_screened(best_screened(pairs, most), _share_of(progress, count))
         candidates = with_found_starts(candidates, [pair.screened for pair in pairs])
         stages.append([larger for _, larger in fitted])
@@ -215,18 +212,6 @@ def _forward(
             break
         best, frontier = better[0], better
     return best, stages
-
-
-def _without_variants(explanations: Sequence[FittedSet]) -> list[FittedSet]:
-    """Explanations, the best first, without those that differ from a better one in the variant of an effect alone.
-
-    Variants are an effect's laws and the controls that share it. Which of them stands is decided when each cause is
-    compared with its alternatives, the other causes given.
-    """
-    best: dict[frozenset[str], FittedSet] = {}
-    for each in explanations:
-        best.setdefault(frozenset(c.effect if c.effect in SHARED else c.label for c in each.fit.candidates), each)
-    return list(best.values())
 
 
 def _is_better(base: FittedSet, best: FittedSet, pair: tuple[FittedSet, FittedSet]) -> bool:
