@@ -57,7 +57,7 @@ def hear(probe: Probe, bag: Path, *options: str) -> tuple[list[Imu], list[Clock]
 
 
 def test_a_bag_is_heard_whole_in_order_with_its_own_stamps(probe: Probe, bag: Path) -> None:
-    """Nobody listens to the other topics: after ``--wait``, in which all have found each other, it plays all the same."""
+    """Nobody listens to the other topics: it plays all the same after ``--wait``, in which all others are found."""
     imu, clock = hear(probe, bag, "--rate", "8", "--wait", "2", "--clock")
     stream = read_streams(bag).imu
     heard = [conversion.stamp_ns(message.header.stamp) for message in imu]
