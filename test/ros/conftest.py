@@ -20,17 +20,11 @@ else:
 
 @pytest.fixture(scope="session")
 def ros() -> Iterator[None]:
-    """ROS in a domain of this run's own, so that neither other runs nor other workers are heard.
-
-    It speaks UDP, because tests kill nodes: what a killed process leaves in Fast DDS's shared memory can end another
-    one with a segmentation fault when that closes its node (seen once in 65 runs of a test that kills two).
-    The tests of the commands leave the transport as it is.
-    """
+    """ROS in a domain of this run's own, so that neither other runs nor other workers are heard."""
     assert sysid_node.ros
     worker = os.environ.get("PYTEST_XDIST_WORKER", "")
     run = os.getppid() if worker else os.getpid()  # workers of one run have one parent
     os.environ["ROS_DOMAIN_ID"] = str(1 + (2 * run + int(worker.removeprefix("gw") or 0)) % 100)
-    os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(ROOT / "config" / "fast_discovery.xml")
     rclpy.init(args=["--ros-args", "-p", "autostart:=false"])
