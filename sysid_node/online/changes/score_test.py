@@ -14,7 +14,9 @@ the controls hardly move, it is the largest part of the score. It is taken off, 
 more than the file's noise makes: how large the noise is at present is not known better. Over stretches shorter than the
 period of the line spacing Z'KZ is Z'Z over twice that spacing. S is taken by bands, and no less than what no
 derivatives explain of the stretch itself: air that has become rougher is no contradiction either. C counts with the
-factor that gusts bring to the variances, which the controls answer. Where a servo's time is known to a standard error
+factor that gusts bring to the variances, which the controls answer. So does Z'KZ of the stretch, with the correlation
+of its own deflections and gusts (``gust_correlation``): where surfaces are not moved on purpose, they only answer gusts.
+Where a servo's time is known to a standard error
 only, what such an error makes of the score is added to its covariance. So are the errors of what the lines were
 corrected for (``corrected_lines``), and a share of the estimates' systematic errors.
 """
@@ -32,6 +34,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 from scipy.special import fdtrc
 
+from sysid_node.online.regression.gust_correlation import answered_gusts, share_of_gusts
 from sysid_node.online.regression.information import Spectrum
 from sysid_node.online.regression.instruments import InstrumentModel
 from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
@@ -60,6 +63,7 @@ class ReferenceEstimates:
     noise_score: Array | None = None  # (P, C) the score's mean by the sensors' noise, per line and second; None: zero
     time_errors: Array | None = None  # (P,) standard errors of the regressors' times, s; None: all are exact
     inflation: Array | None = None  # (C,) factors of the covariance by gusts that the controls answer; None: one
+    sensed: Array | None = None  # (C,) density of the sensors' noise in the residuals; None: no controls answer gusts
     systematic: Array | None = None  # (C, P, P) systematic covariance of the estimates; None: all is exact
     correction: LineCorrection | None = None  # of the lines that the estimates are of; None: they are as recorded
     corrected: ReferenceEstimates | None = None  # the same estimates by corrected lines; None: there are none
@@ -73,6 +77,7 @@ class ReferenceEstimates:
         exact = np.zeros(some[0].equations.columns.size)
         times = [exact if one.time_errors is None else one.time_errors for one in some]
         none, zero = np.ones(solution.theta.shape[-1]), np.zeros_like(uncertainty.covariance[0])
+        no_gusts = np.full_like(none, np.inf)
         return cls(
             some[0].time,
             some[0].equations,
@@ -82,6 +87,7 @@ class ReferenceEstimates:
             np.array(scores),
             np.array(times),
             np.array([none if one.inflation is None else one.inflation for one in some]),
+            np.array([no_gusts if one.sensed is None else one.sensed for one in some]),
             np.array([zero if one.systematic is None else one.systematic for one in some]),
         )
 
@@ -127,14 +133,21 @@ def score_test(
     regressed = gram.take(equations.columns, axis=-1)
     left_over = gram.take(equations.outputs, axis=-1) - regressed @ reference.solution.theta
     count = structure.belongs.sum(axis=0)
-    rest = _unexplained(equations, reference, regressed, left_over)
+    normal = regressed.take(equations.columns, axis=-2)
+    rest = _unexplained(equations, reference, normal, left_over)
     energy = 0.5 * lines.shape[-2] * np.asarray(duration)[..., None]
     density = rest / np.maximum(energy - (count + NUISANCES) * density_per_gram, LEAST * energy)
     excess = density / np.maximum(known.density, TINY)
     Z = lines.take(equations.instruments, axis=-1)[..., None, :, :]
     of_each = _band_of_each(tuple(band.stop for band in spectrum.bands))
     noise = (Z.swapaxes(-1, -2) * known.bands.take(of_each, axis=-1)[..., None, :]) @ Z
-    noise *= (density_per_gram * np.maximum(excess, 1.0))[..., None, None]
+    more = np.maximum(excess, 1.0)
+    if reference.sensed is not None:
+        usual = more * known.density
+        gusts = share_of_gusts(usual, reference.sensed)
+        answered = answered_gusts(equations, reference.solution.theta, normal, gusts * usual * energy)
+        more = more * (1.0 + answered**2 * gusts * energy / density_per_gram)
+    noise *= (density_per_gram * more)[..., None, None]
     G = (regressed.take(equations.instruments, axis=-2) * structure.same_block)[..., None, :, :]
     covariance = known.covariance
     if reference.inflation is not None:
@@ -170,14 +183,15 @@ def _by_times(reference: ReferenceEstimates, instruments: Array, regressors: Arr
     return off @ off.swapaxes(-1, -2)
 
 
-def _unexplained(
-    equations: NormalEquations, reference: ReferenceEstimates, regressed: Array, left_over: Array
-) -> Array:
-    """(..., C) the least that any change of the derivatives would leave of the residuals' energy."""
+def _unexplained(equations: NormalEquations, reference: ReferenceEstimates, normal: Array, left_over: Array) -> Array:
+    """(..., C) the least that any change of the derivatives would leave of the residuals' energy.
+
+    ``normal`` (..., P, P): Gram matrix of the regressors.
+    """
     structure = equations.structure
     misfit: Array = left_over.take(equations.outputs, axis=-2).diagonal(axis1=-2, axis2=-1).copy()
     score = left_over.take(equations.columns, axis=-2) * structure.belongs
-    normal = regressed.take(equations.columns, axis=-2) * structure.same_block
+    normal = normal * structure.same_block
     normal += structure.unit * (RIDGE * normal.diagonal(axis1=-2, axis2=-1) + TINY)[..., None, :]
     solved = np.empty_like(score)
     for one, right, found in zip(_each(normal), _each(score), _each(solved), strict=True):

@@ -2,10 +2,16 @@
 
 Instruments made from the deflections are uncorrelated with gusts only if nobody answers gusts with the surfaces.
 Pilots and autopilots do. The resulting bias cannot be estimated from the flight, but it can be allowed for: a
-correlation of ``ALLOWED`` between instruments and gusts shifts an estimate by that share of the square root of the
-degrees of freedom in standard errors (Conley, Hansen & Rossi, "Plausibly exogenous", Review of Economics and Statistics
-94, 2012). Intervals therefore stop shrinking with more data at that bound. The sensors' noise hardly moves a
-surface, so only the part of a residual beyond the sensors' noise counts as gusts.
+correlation rho between instruments and gusts shifts an estimate by rho times the square root of the degrees of freedom
+in standard errors (Conley, Hansen & Rossi, "Plausibly exogenous", Review of Economics and Statistics 94, 2012).
+Intervals therefore stop shrinking with more data at that bound. The sensors' noise hardly moves a surface, so only the
+part of a residual beyond the sensors' noise counts as gusts.
+
+The less the surfaces are moved on purpose, the more of their movement answers gusts, and the larger rho may be: the
+share of gusts in the deflections grows with the energy of the gusts' moments over that of the moments by deflections
+(Ljung, "System Identification", 2nd ed. (1999), sect. 13.4, of feedback without excitation). So rho is taken as
+``ANSWERED`` times the root of that ratio, and as ``ALLOWED`` at least. All coefficients with the same regressors have
+the same instruments, and so the largest ratio among their moments.
 """
 
 from __future__ import annotations
@@ -22,17 +28,44 @@ from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
-ALLOWED = 0.05  # correlation between instruments and gusts
+ALLOWED = 0.05  # correlation between instruments and gusts, where surfaces are moved on purpose
+ANSWERED = 0.15  # that correlation where the gusts' moments have the energy of the moments by deflections
+MOMENTS = ("Cl", "Cm", "Cn")
 
 
-def share_of_gusts(spread: Uncertainty, sensed: Array) -> Array:
-    """(C,) share of each residual that is not the sensors' noise, of which ``sensed`` (C,) is the density."""
-    return np.asarray(np.clip(1.0 - DOUBT * sensed / np.maximum(spread.density, 1e-300), 0.0, 1.0))
+def share_of_gusts(density: Array, sensed: Array) -> Array:
+    """(..., C) share of residuals of a ``density`` that is not the sensors' noise, of which ``sensed`` is the density."""
+    return np.asarray(np.clip(1.0 - DOUBT * sensed / np.maximum(density, 1e-300), 0.0, 1.0))
 
 
-def inflation(spread: Uncertainty, gusts: Array) -> Array:
-    """(C,) factors of the covariance; ``gusts`` (C,): see ``share_of_gusts``."""
-    return np.asarray(1.0 + ALLOWED**2 * spread.freedom * gusts)
+def inflation(spread: Uncertainty, gusts: Array, correlation: Array) -> Array:
+    """(C,) factors of the covariance; ``gusts`` (C,): see ``share_of_gusts``, ``correlation`` (C,) that is allowed."""
+    return np.asarray(1.0 + correlation**2 * spread.freedom * gusts)
+
+
+def allowed_correlation(equations: NormalEquations, solution: Solution, gram: Array, gusts: Array) -> Array:
+    """(C,) correlation between instruments and gusts that is allowed for in a ``solution``.
+
+    ``gram`` (W, W) of which it is; ``gusts`` (C,): see ``share_of_gusts``.
+    """
+    columns = equations.columns
+    normal = gram[columns[:, None], columns]
+    return np.maximum(answered_gusts(equations, solution.theta, normal, gusts * solution.residual), ALLOWED)
+
+
+def answered_gusts(equations: NormalEquations, theta: Array, normal: Array, energy: Array) -> Array:
+    """(..., C) correlation between instruments and gusts by the ``energy`` (..., C) of the gusts' moments.
+
+    ``theta`` (..., P, C): derivatives; ``normal`` (..., P, P): Gram matrix of the regressors.
+    """
+    structure = equations.structure
+    by_deflections = theta * equations.deflected[:, None]
+    moved = ((normal @ by_deflections) * by_deflections).sum(axis=-2)
+    told = np.isin(structure.coefficients, MOMENTS) & (moved > 0.0)
+    ratio = np.where(told, energy / np.where(told, moved, 1.0), 0.0)
+    alike = structure.block[:, None] == structure.block
+    of_block = np.where(alike, ratio[..., None, :], 0.0).max(axis=-1)
+    return np.minimum(ANSWERED * np.sqrt(of_block), 1.0)
 
 
 def sensed(

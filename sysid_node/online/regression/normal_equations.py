@@ -95,6 +95,7 @@ class NormalEquations:
     outputs: Index  # (C,) column of each coefficient
     instruments: Index  # (P,) column of each unknown's instrument: its regressor, in least squares
     width: int  # W
+    deflected: NDArray[np.bool_]  # (P,) whether the unknown's regressor is a control's deflection
     entries: GramEntries = field(init=False)
     instrumented: NDArray[np.bool_] = field(init=False)  # (C,) whether any of its regressors has an instrument
     least_squares: bool = field(init=False)  # whether every regressor is its own instrument
@@ -111,12 +112,14 @@ class NormalEquations:
 def normal_equations(regressors: dict[str, tuple[str, ...]], layout: SignalLayout) -> NormalEquations:
     """Normal equations of a model (see ``model_structure``) with the signals of a layout; offsets come after."""
     structure = model_structure(regressors)
+    columns = np.array([layout.column(r) for r in structure.regressors], dtype=np.intp)
     return NormalEquations(
         structure=structure,
-        columns=np.array([layout.column(r) for r in structure.regressors], dtype=np.intp),
+        columns=columns,
         outputs=np.array([layout.column(c) for c in structure.coefficients], dtype=np.intp),
         instruments=np.array([layout.instrument(r) for r in structure.regressors], dtype=np.intp),
         width=layout.width,
+        deflected=(columns >= layout.deflections.start) & (columns < layout.deflections.stop),
     )
 
 

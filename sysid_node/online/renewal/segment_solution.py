@@ -136,7 +136,9 @@ def _reference(
     equations, now = state.equations, state.transform.last
     noise = None if found.noise is None else regressor_noise.noise_score(equations, solution, found.noise)
     model = state.controls.line_model
-    return ReferenceEstimates(now, equations, solution, spread, model, noise, inflation=found.inflation)
+    return ReferenceEstimates(
+        now, equations, solution, spread, model, noise, inflation=found.inflation, sensed=found.sensed
+    )
 
 
 def _corrected_signals(

@@ -34,6 +34,7 @@ class SolvedEquations(NamedTuple):
     noise: Array | None  # (W, W) of which that was made, per line and second
     spread: Uncertainty
     inflation: Array  # (C,) factors of the variances by gusts
+    sensed: Array  # (C,) density of the sensors' noise in the residuals
     instruments: InstrumentChecks
 
 
@@ -45,9 +46,12 @@ def solved_equations(state: EstimatorState, total: Information, gram: Array) -> 
     noise_alone = spread.covariance
     if state.flow.active:
         spread.covariance = noise_alone + _reconstruction_covariance(state, solution, total)
-    gusts = _gust_shares(state, total, equations, solution, spread)
+    sensed = _sensed(state, total, equations, solution)
+    gusts = gust_correlation.share_of_gusts(spread.density, sensed)
     checks = _instrument_checks(state, total, gram, strength, solution, spread, noise_alone, gusts)
-    return SolvedEquations(solution, compensation, noise, spread, gust_correlation.inflation(spread, gusts), checks)
+    correlation = gust_correlation.allowed_correlation(equations, solution, gram, gusts)
+    inflation = gust_correlation.inflation(spread, gusts, correlation)
+    return SolvedEquations(solution, compensation, noise, spread, inflation, sensed, checks)
 
 
 def _solve(
@@ -108,11 +112,8 @@ def _reconstruction_covariance(state: EstimatorState, solution: Solution, total:
     )
 
 
-def _gust_shares(
-    state: EstimatorState, total: Information, equations: NormalEquations, solution: Solution, spread: Uncertainty
-) -> Array:
-    """(C,) share of the residuals that are gusts."""
+def _sensed(state: EstimatorState, total: Information, equations: NormalEquations, solution: Solution) -> Array:
+    """(C,) density of the sensors' noise in the residuals."""
     aircraft, omega = state.model.aircraft, state.model.spectrum.omega
     per_line, step = total.bias / line_seconds(state, total), total.energy / max(total.samples, 1.0)
-    sensed = gust_correlation.sensed(aircraft, equations, solution, per_line, total.noise_moments, step, omega)
-    return gust_correlation.share_of_gusts(spread, sensed)
+    return gust_correlation.sensed(aircraft, equations, solution, per_line, total.noise_moments, step, omega)

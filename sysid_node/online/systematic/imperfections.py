@@ -154,7 +154,7 @@ def _uncertain_servos(
             sigma = max(sigma, SMALLEST)  # the flight may make it later by a limit that is not exactly known
         whole = math.hypot(sigma, unseen)
         if whole > 0.0:
-            silent = commanded and stated == 0.0 and sigma > KNOWN
+            silent = stated == 0.0 and sigma > KNOWN
             mean, spread = _later(stated, sigma) if commanded else (0.0, sigma)
             rows.append(_UncertainServo(name, place, mean, math.hypot(spread, unseen), damped / whole, silent))
     return rows

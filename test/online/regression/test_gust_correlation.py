@@ -7,7 +7,7 @@ from plant import made_aircraft
 
 from sysid_node.online.frequency.regression_signals import layout
 from sysid_node.online.regression import gust_correlation, normal_equations
-from sysid_node.online.regression.gust_correlation import ALLOWED
+from sysid_node.online.regression.gust_correlation import ALLOWED, ANSWERED
 from sysid_node.online.regression.heteroskedasticity import DOUBT, NoiseMoments
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
 
@@ -21,7 +21,7 @@ def spread(density: Array, freedom: float) -> Uncertainty:
 
 
 def inflation(of: Uncertainty, sensed: Array) -> Array:
-    return gust_correlation.inflation(of, gust_correlation.share_of_gusts(of, sensed))
+    return gust_correlation.inflation(of, gust_correlation.share_of_gusts(of.density, sensed), np.array([ALLOWED]))
 
 
 def test_sensor_noise_alone_is_no_reason_for_doubt() -> None:
@@ -55,3 +55,38 @@ def test_the_sensors_part_of_a_residual_is_their_noise() -> None:
     assert lift == pytest.approx(step * (AIRCRAFT.noise["accel"] * AIRCRAFT.mass / qS) ** 2)
     turning = AIRCRAFT.noise["gyro"] * AIRCRAFT.inertia.Iyy / (qS * g.cbar)
     assert pitch == pytest.approx(step * turning**2 * (9.0 + 16.0 + 25.0) / 3.0)
+
+
+def correlation(moved: float, left: float, gusts: float = 1.0) -> Array:
+    """What is allowed for CL, Cm and Cl, where the deflections' pitching moment has the energy ``moved``.
+
+    Gusts leave ``left`` of CL and of Cm, and a hundredth of the deflections' energy of Cl.
+    """
+    signals = layout(AIRCRAFT, ())
+    regressors = {"CL": ("alpha", "de"), "Cm": ("alpha", "de"), "Cl": ("p", "da")}
+    plan = normal_equations.normal_equations(regressors, signals)
+    theta = np.array([[5.0, -0.6, 0.0], [0.3, -0.5, 0.0], [0.0, 0.0, -0.4], [0.0, 0.0, 0.2]])
+    left_of_each = np.array([left, left, 0.01])
+    solution = Solution(theta, np.zeros((4, 4)), left_of_each, left_of_each, np.array(True))
+    gram = np.diag(np.full(signals.width, 1e6))  # of the motion
+    gram[signals.column("de"), signals.column("de")] = moved / 0.5**2
+    gram[signals.column("da"), signals.column("da")] = 1.0 / 0.2**2
+    shares = np.full(3, gusts)
+    return gust_correlation.allowed_correlation(plan, solution, gram, shares)
+
+
+def test_the_less_surfaces_are_moved_on_purpose_the_more_they_may_answer_gusts() -> None:
+    """By the ratio of energies, in all coefficients of the same regressors: lift has the elevator of the moment."""
+    np.testing.assert_allclose(correlation(moved=4.0, left=4.0), [ANSWERED, ANSWERED, ALLOWED])
+    np.testing.assert_allclose(correlation(moved=1.0, left=4.0), [2.0 * ANSWERED, 2.0 * ANSWERED, ALLOWED])
+    np.testing.assert_allclose(correlation(moved=1.0, left=0.01), ALLOWED)
+    np.testing.assert_allclose(correlation(moved=1.0, left=1e6), [1.0, 1.0, ALLOWED])
+
+
+def test_what_sensors_leave_is_no_gust_that_surfaces_answer() -> None:
+    np.testing.assert_allclose(correlation(moved=1.0, left=4.0, gusts=0.0), ALLOWED)
+    np.testing.assert_allclose(correlation(moved=1.0, left=4.0, gusts=0.25), [ANSWERED, ANSWERED, ALLOWED])
+
+
+def test_a_surface_that_never_moved_says_nothing() -> None:
+    np.testing.assert_allclose(correlation(moved=0.0, left=4.0), ALLOWED)
