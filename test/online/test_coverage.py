@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.estimation.judging import METHODS, estimates, judge
+from bench.estimation.judging import LOWER, METHODS, UPPER, VALID, estimates, judge
 from bench.estimation.simulated_flights import AIR_INTERVAL, Setting, fly
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.online.types import SAMPLE_COLUMNS
@@ -26,6 +26,16 @@ def test_intervals_hold_the_truth(turbulence):
     assert np.mean([v.share_valid for v in verdicts]) > 0.9
     assert 0.88 < np.nanmean([v.coverage for v in verdicts]) < 0.99
     assert sum(v.far for v in verdicts) <= 0.005 * sum(v.valid for v in verdicts)
+
+
+def test_estimates_stay_valid_where_surfaces_only_answer_gusts():
+    """Multisines for 20 s, then straight flight on the autopilot: what was learned stays valid, and holds."""
+    sines = "multisine:elevator,aileron,rudder:amplitude=0.06,0.06,0.12:length=20:low=0.1:high=2:start=0.7"
+    setting = Setting("straight flight", "light", manoeuvre=(sines,), seconds=60.0)
+    found = estimates("cdrw", setting, [METHODS["iv_rft"]], np.arange(35.0, 60.0, 5.0), [1, 2])[0]
+    assert (found[..., VALID] > 0.0).mean() > 0.95
+    inside = (found[..., LOWER] < TRUTH) & (np.array(TRUTH) < found[..., UPPER])
+    assert inside[found[..., VALID] > 0.0].mean() > 0.9
 
 
 def test_a_verdict_knows_honest_estimates_from_bold_ones():

@@ -14,11 +14,11 @@ the controls hardly move, it is the largest part of the score. It is taken off, 
 more than the file's noise makes: how large the noise is at present is not known better. Over stretches shorter than the
 period of the line spacing Z'KZ is Z'Z over twice that spacing. S is taken by bands, and no less than what no
 derivatives explain of the stretch itself: air that has become rougher is no contradiction either. C counts with the
-factor that gusts bring to the variances, which the controls answer. So does Z'KZ of the stretch, with the correlation
-of its own deflections and gusts (``gust_correlation``): where surfaces are not moved on purpose, they only answer gusts.
-Where a servo's time is known to a standard error
-only, what such an error makes of the score is added to its covariance. So are the errors of what the lines were
-corrected for (``corrected_lines``), and a share of the estimates' systematic errors.
+factor that gusts bring to the variances, which the controls answer. So does Z'KZ, by the correlation of the stretch's
+own deflections with gusts (``gust_correlation``): where surfaces are not moved on purpose, they only answer gusts.
+Where a servo's time is known to a standard error only, what such an error makes of the score is added to its
+covariance. So are the errors of what the lines were corrected for (``corrected_lines``), and a share of the estimates'
+systematic errors.
 """
 
 from __future__ import annotations

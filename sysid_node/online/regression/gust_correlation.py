@@ -34,7 +34,7 @@ MOMENTS = ("Cl", "Cm", "Cn")
 
 
 def share_of_gusts(density: Array, sensed: Array) -> Array:
-    """(..., C) share of residuals of a ``density`` that is not the sensors' noise, of which ``sensed`` is the density."""
+    """(..., C) share of a residual's ``density`` that is not the sensors' noise, which has the density ``sensed``."""
     return np.asarray(np.clip(1.0 - DOUBT * sensed / np.maximum(density, 1e-300), 0.0, 1.0))
 
 

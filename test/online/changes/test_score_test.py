@@ -14,6 +14,7 @@ from sysid_node.online.changes.detection import ChangeTests
 from sysid_node.online.changes.score_test import ReferenceEstimates, ScoreTest, disagreement, score_test
 from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression import normal_equations, regressor_noise
+from sysid_node.online.regression.gust_correlation import ANSWERED
 from sysid_node.online.regression.information import BANDS, spectrum
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
 from sysid_node.online.settings import METHODS, OnlineSettings
@@ -130,6 +131,31 @@ def test_the_noise_of_regressors_that_do_not_move_is_no_contradiction() -> None:
     shifted = lines.copy()
     shifted[:, PLAN.outputs] += 20.0 * lines[:, [alpha]]  # what noise cannot do: the score has the other sign
     assert (score_test(freed, shifted, SPECTRUM, duration).chance(1.0) < 1e-6).all()
+
+
+def test_a_stretch_in_which_surfaces_only_answer_gusts_contradicts_less() -> None:
+    """The pitching moment's score may be correlated with gusts. Nothing is known of lift: its regressors are others."""
+    rng, duration = np.random.default_rng(8), 12.0
+    lines, P, C = rng.normal(size=(LINES, PLAN.width)), PLAN.columns.size, PLAN.outputs.size
+    lines[:, LAYOUT.column("de")] *= 2.0
+    theta = np.where(PLAN.columns == LAYOUT.column("de"), -0.6, 0.0)[:, None] * PLAN.structure.belongs
+    exact = reference(theta, np.zeros((C, P, P)), DENSITY)
+    told = replace(exact, sensed=np.zeros(C))
+    before, after = (score_test(one, lines, SPECTRUM, duration) for one in (exact, told))
+    lift, moment = PLAN.structure.coefficients.index("CL"), PLAN.structure.coefficients.index("Cm")
+    energy = 0.5 * LINES * duration
+    gusts = float(before.unexplained[moment]) * DENSITY * energy
+    assert before.unexplained[moment] > 1.0  # rougher than usual
+    ratio = gusts / (0.6**2 * float(np.square(lines[:, LAYOUT.column("de")]).sum()))
+    factor = 1.0 + ANSWERED**2 * ratio * energy * 0.04 / 0.5
+    assert ANSWERED**2 * ratio < 1.0
+    assert before.statistic[moment] / after.statistic[moment] == pytest.approx(factor, rel=1e-6)
+    assert after.statistic[lift] == pytest.approx(before.statistic[lift])
+    sensed = replace(exact, sensed=np.full(C, 1e6))  # what the sensors' noise explains is no gust
+    np.testing.assert_allclose(score_test(sensed, lines, SPECTRUM, duration).statistic, before.statistic)
+    several = ReferenceEstimates.stacked([exact, told])
+    both = score_test(several, np.array([lines, lines]), SPECTRUM, [duration, duration])
+    np.testing.assert_allclose(both.statistic, [before.statistic, after.statistic])
 
 
 def test_what_an_error_of_a_servos_time_explains_is_no_contradiction() -> None:
