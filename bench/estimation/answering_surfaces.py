@@ -40,7 +40,7 @@ SECONDS = 300.0
 
 def doublets(every: float) -> tuple[str, ...]:
     """One on each surface in turn, as often as it fits."""
-    count = int(SECONDS / every)
+    count = int((SECONDS - 10.0) / every)
     return tuple(
         f"doublet:{surface}:amplitude={peak}:width=0.35:start={5.0 + i * every / 3.0}:every={every}:repeat={count}"
         for i, (surface, peak) in enumerate(PEAKS.items())
@@ -79,16 +79,14 @@ def correlations(state: EstimatorState) -> tuple[float, float, float]:
     c, gram = equations.structure.coefficients.index(COEFFICIENT), latest.total.grams.sum(axis=0)
     sensed = state.changes.monitor.references[-1].sensed
     gusts = gust_correlation.share_of_gusts(latest.uncertainty.density, sensed)
-    allowed = gust_correlation.allowed_correlation(equations, latest.solution, gram, gusts)[c]
-    normal, energy = gram[np.ix_(equations.columns, equations.columns)], gusts * latest.solution.residual
-    answered = gust_correlation.answered_gusts(equations, latest.solution.theta, normal, energy)[c]
+    answered = float(gust_correlation.of_solution(equations, latest.solution, gram, gusts)[c])
     left = least_squares.misfits(equations, _truth(state))[:, c]
     own = equations.structure.unknowns(c)
     Z = equations.instruments[own]
     score = gram[Z] @ left
     explained = float(score @ np.linalg.solve(gram[np.ix_(Z, Z)], score)) / float(left @ gram @ left)
     each = explained / own.size - 1.0 / float(latest.uncertainty.freedom[c])
-    return (answered / gust_correlation.ANSWERED) ** 2, each, allowed
+    return (answered / gust_correlation.ANSWERED) ** 2, each, max(answered, gust_correlation.ALLOWED)
 
 
 def _truth(state: EstimatorState) -> Array:

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 from scipy.special import fdtrc
 
-from sysid_node.online.regression.gust_correlation import answered_gusts, share_of_gusts
+from sysid_node.online.regression import gust_correlation
 from sysid_node.online.regression.information import Spectrum
 from sysid_node.online.regression.instruments import InstrumentModel
 from sysid_node.online.regression.least_squares import TINY, Solution, Uncertainty
@@ -144,8 +144,8 @@ def score_test(
     more = np.maximum(excess, 1.0)
     if reference.sensed is not None:
         usual = more * known.density
-        gusts = share_of_gusts(usual, reference.sensed)
-        answered = answered_gusts(equations, reference.solution.theta, normal, gusts * usual * energy)
+        gusts = gust_correlation.share_of_gusts(usual, reference.sensed)
+        answered = gust_correlation.by_deflections(equations, reference.solution.theta, normal, gusts * usual * energy)
         more = more * (1.0 + answered**2 * gusts * energy / density_per_gram)
     noise *= (density_per_gram * more)[..., None, None]
     G = (regressed.take(equations.instruments, axis=-2) * structure.same_block)[..., None, :, :]

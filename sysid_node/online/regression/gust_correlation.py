@@ -38,29 +38,28 @@ def share_of_gusts(density: Array, sensed: Array) -> Array:
     return np.asarray(np.clip(1.0 - DOUBT * sensed / np.maximum(density, 1e-300), 0.0, 1.0))
 
 
-def inflation(spread: Uncertainty, gusts: Array, correlation: Array) -> Array:
-    """(C,) factors of the covariance; ``gusts`` (C,): see ``share_of_gusts``, ``correlation`` (C,) that is allowed."""
-    return np.asarray(1.0 + correlation**2 * spread.freedom * gusts)
+def inflation(spread: Uncertainty, gusts: Array, answered: Array) -> Array:
+    """(C,) factors of the covariance; ``gusts`` (C,): see ``share_of_gusts``, ``answered`` (C,): ``of_solution``."""
+    return np.asarray(1.0 + np.maximum(answered, ALLOWED) ** 2 * spread.freedom * gusts)
 
 
-def allowed_correlation(equations: NormalEquations, solution: Solution, gram: Array, gusts: Array) -> Array:
-    """(C,) correlation between instruments and gusts that is allowed for in a ``solution``.
+def of_solution(equations: NormalEquations, solution: Solution, gram: Array, gusts: Array) -> Array:
+    """(C,) correlation between instruments and gusts by the deflections of a flight.
 
-    ``gram`` (W, W) of which it is; ``gusts`` (C,): see ``share_of_gusts``.
+    ``gram`` (W, W) of which the ``solution`` is; ``gusts`` (C,): see ``share_of_gusts``.
     """
     columns = equations.columns
-    normal = gram[columns[:, None], columns]
-    return np.maximum(answered_gusts(equations, solution.theta, normal, gusts * solution.residual), ALLOWED)
+    return by_deflections(equations, solution.theta, gram[columns[:, None], columns], gusts * solution.residual)
 
 
-def answered_gusts(equations: NormalEquations, theta: Array, normal: Array, energy: Array) -> Array:
+def by_deflections(equations: NormalEquations, theta: Array, normal: Array, energy: Array) -> Array:
     """(..., C) correlation between instruments and gusts by the ``energy`` (..., C) of the gusts' moments.
 
     ``theta`` (..., P, C): derivatives; ``normal`` (..., P, P): Gram matrix of the regressors.
     """
     structure = equations.structure
-    by_deflections = theta * equations.deflected[:, None]
-    moved = ((normal @ by_deflections) * by_deflections).sum(axis=-2)
+    of_controls = theta * equations.deflected[:, None]
+    moved = ((normal @ of_controls) * of_controls).sum(axis=-2)
     told = np.isin(structure.coefficients, MOMENTS) & (moved > 0.0)
     ratio = np.where(told, energy / np.where(told, moved, 1.0), 0.0)
     alike = structure.block[:, None] == structure.block

@@ -34,6 +34,7 @@ class SolvedEquations(NamedTuple):
     noise: Array | None  # (W, W) of which that was made, per line and second
     spread: Uncertainty
     inflation: Array  # (C,) factors of the variances by gusts
+    answered: Array  # (C,) correlation between instruments and gusts by the deflections
     sensed: Array  # (C,) density of the sensors' noise in the residuals
     instruments: InstrumentChecks
 
@@ -49,9 +50,9 @@ def solved_equations(state: EstimatorState, total: Information, gram: Array) -> 
     sensed = _sensed(state, total, equations, solution)
     gusts = gust_correlation.share_of_gusts(spread.density, sensed)
     checks = _instrument_checks(state, total, gram, strength, solution, spread, noise_alone, gusts)
-    correlation = gust_correlation.allowed_correlation(equations, solution, gram, gusts)
-    inflation = gust_correlation.inflation(spread, gusts, correlation)
-    return SolvedEquations(solution, compensation, noise, spread, inflation, sensed, checks)
+    answered = gust_correlation.of_solution(equations, solution, gram, gusts)
+    inflation = gust_correlation.inflation(spread, gusts, answered)
+    return SolvedEquations(solution, compensation, noise, spread, inflation, answered, sensed, checks)
 
 
 def _solve(

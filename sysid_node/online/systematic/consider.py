@@ -42,7 +42,7 @@ from sysid_node.online.regression.least_squares import RIDGE, TINY, Solution, mi
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.systematic.column_changes import ColumnChanges
 from sysid_node.online.systematic.corrected_signals import CorrectedSignals
-from sysid_node.online.systematic.many_instruments import Scores
+from sysid_node.online.systematic.many_instruments import Scores, share_taken_up
 
 Array = NDArray[np.float64]
 
@@ -150,18 +150,21 @@ def consider(
     place: NDArray[np.intp],
     beliefs: Beliefs,
     freedom: Array,
+    answered: Array,
     noise_gram: Array | None = None,
 ) -> Generator[None, None, Considered]:
     """From the corrected ``signals`` and their ``solution``; ``noise`` (C,) is per unit of the Gram matrix.
 
     ``place`` (W,): where the columns of the regression stand among the signals. ``freedom`` (C,) are the noise's
-    degrees of freedom. ``noise_gram`` (W, W): the Gram matrix of the regressors' noise that the ``solution`` was
-    freed of. It is made in two steps (``state.Steps``).
+    degrees of freedom; ``answered`` (C,): see ``gust_correlation.of_solution``. ``noise_gram`` (W, W): the Gram matrix
+    of the regressors' noise that the ``solution`` was freed of. It is made in two steps (``state.Steps``).
     """
     sigmas = beliefs.sigmas
     of_each = _sensitivities(equations, solution, signals, place, sigmas, noise_gram)
     yield
-    found = _findings(equations, of_each.residuals, noise, signals, place, freedom, freed=noise_gram is not None)
+    found = _findings(
+        equations, of_each.residuals, noise, signals, place, freedom, answered, freed=noise_gram is not None
+    )
     off = (beliefs.centre - signals.estimate) / sigmas
     step, covariance = _posterior(*found.scores.weighed(), off, beliefs.precision)
     jacobian = _jacobian(equations, signals.changes, of_each.v, of_each.J, sigmas, signals.corrected_means)
@@ -214,6 +217,7 @@ def _findings(
     signals: CorrectedSignals,
     place: NDArray[np.intp],
     freedom: Array,
+    answered: Array,
     *,
     freed: bool,
 ) -> _Findings:
@@ -232,7 +236,7 @@ def _findings(
             further = project.shape[0] - int(structure.belongs[:, c].sum())  # than the unknowns take
             explained[c] = float(q[:, -1] @ q[:, -1])
             misfit[c] = max(float(explained[c]) / (float(noise[c]) * max(further, 1)), 1.0)
-            share = further / max(float(freedom[c]), 1.0)
+            share = share_taken_up(project.shape[0], further, float(freedom[c]), float(answered[c]))
             scores.add(q[:, :-1].T @ q, D @ gram @ residuals[c].T, share, float(noise[c] * misfit[c]))
     return _Findings(scores, misfit, explained, moves)
 

@@ -7,8 +7,11 @@ correlated: the gust's moment is in r, the motion that it causes in D. The score
     E[D'Pr] = alpha E[D'r],        alpha = (E - p) / nu,
 
 with the p signals that the unknowns take of the E, and nu degrees of freedom of the noise. It does not vanish with
-more data. In turbulence it makes servos seem faster than they are. It is subtracted, as Nagar does (Econometrica 27,
-1959; a k-class estimator with k = 1 / (1 - alpha)):
+more data. In turbulence it makes servos seem faster than they are. Where the deflections answer gusts, P keeps more
+than that: E times the mean square of the correlation between one signal and gusts, which is a share of the largest that
+is allowed for (``gust_correlation``), is the ratio of what is kept to what is not (``share_taken_up``). Without it, air
+data seem early where gusts turn the air: such air acts on the moments in proportion to the flow angles' rates. The mean
+is subtracted, as Nagar does (Econometrica 27, 1959; a k-class estimator with k = 1 / (1 - alpha)):
 
     s = D'(P - alpha I) r / (1 - alpha) / w,      Q = D'(P - alpha I) D / (1 - alpha) / w,      N = D'PD / w
 
@@ -26,10 +29,23 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: Mean square of the correlation between an exogenous signal and gusts, over the square of what is allowed for.
+KEPT = 0.2
 LARGEST_SHARE = 0.9  # of the noise that the exogenous signals take up, from which on an equation tells nothing
 #: Variance of a score from which on a combination of imperfections counts. Under one the flight would tell less of it
 #: than its tolerance does, and what it seems to tell is mostly the noise that was not taken out.
 TELLING = 1.0
+
+
+def share_taken_up(signals: int, further: int, freedom: float, answered: float) -> float:
+    """Share of the noise that so many exogenous ``signals`` take up, ``further`` ones than the unknowns take.
+
+    ``freedom``: the noise's degrees of freedom; ``answered``: the correlation between instruments and gusts that is
+    allowed for.
+    """
+    by_gusts = KEPT * signals * answered**2  # explained by the signals over not explained
+    kept = by_gusts / (1.0 + by_gusts)
+    return kept + (1.0 - kept) * further / max(freedom, 1.0)
 
 
 @dataclass

@@ -21,7 +21,7 @@ def spread(density: Array, freedom: float) -> Uncertainty:
 
 
 def inflation(of: Uncertainty, sensed: Array) -> Array:
-    return gust_correlation.inflation(of, gust_correlation.share_of_gusts(of.density, sensed), np.array([ALLOWED]))
+    return gust_correlation.inflation(of, gust_correlation.share_of_gusts(of.density, sensed), np.zeros(1))
 
 
 def test_sensor_noise_alone_is_no_reason_for_doubt() -> None:
@@ -58,7 +58,7 @@ def test_the_sensors_part_of_a_residual_is_their_noise() -> None:
 
 
 def correlation(moved: float, left: float, gusts: float = 1.0) -> Array:
-    """What is allowed for CL, Cm and Cl, where the deflections' pitching moment has the energy ``moved``.
+    """That of CL, Cm and Cl, where the deflections' pitching moment has the energy ``moved``.
 
     Gusts leave ``left`` of CL and of Cm, and a hundredth of the deflections' energy of Cl.
     """
@@ -72,21 +72,27 @@ def correlation(moved: float, left: float, gusts: float = 1.0) -> Array:
     gram[signals.column("de"), signals.column("de")] = moved / 0.5**2
     gram[signals.column("da"), signals.column("da")] = 1.0 / 0.2**2
     shares = np.full(3, gusts)
-    return gust_correlation.allowed_correlation(plan, solution, gram, shares)
+    return gust_correlation.of_solution(plan, solution, gram, shares)
 
 
 def test_the_less_surfaces_are_moved_on_purpose_the_more_they_may_answer_gusts() -> None:
     """By the ratio of energies, in all coefficients of the same regressors: lift has the elevator of the moment."""
-    np.testing.assert_allclose(correlation(moved=4.0, left=4.0), [ANSWERED, ANSWERED, ALLOWED])
-    np.testing.assert_allclose(correlation(moved=1.0, left=4.0), [2.0 * ANSWERED, 2.0 * ANSWERED, ALLOWED])
-    np.testing.assert_allclose(correlation(moved=1.0, left=0.01), ALLOWED)
-    np.testing.assert_allclose(correlation(moved=1.0, left=1e6), [1.0, 1.0, ALLOWED])
+    hundredth = 0.1 * ANSWERED
+    np.testing.assert_allclose(correlation(moved=4.0, left=4.0), [ANSWERED, ANSWERED, hundredth])
+    np.testing.assert_allclose(correlation(moved=1.0, left=4.0), [2.0 * ANSWERED, 2.0 * ANSWERED, hundredth])
+    np.testing.assert_allclose(correlation(moved=1.0, left=1e6), [1.0, 1.0, hundredth])
+
+
+def test_intervals_are_as_wide_as_the_correlation_asks_and_never_narrower_than_what_is_always_allowed() -> None:
+    of = spread(np.ones(3), 100.0)
+    found = gust_correlation.inflation(of, np.array([1.0, 0.5, 1.0]), np.array([0.3, 0.3, 0.001]))
+    np.testing.assert_allclose(found, [1.0 + 0.09 * 100.0, 1.0 + 0.09 * 50.0, 1.0 + ALLOWED**2 * 100.0])
 
 
 def test_what_sensors_leave_is_no_gust_that_surfaces_answer() -> None:
-    np.testing.assert_allclose(correlation(moved=1.0, left=4.0, gusts=0.0), ALLOWED)
-    np.testing.assert_allclose(correlation(moved=1.0, left=4.0, gusts=0.25), [ANSWERED, ANSWERED, ALLOWED])
+    np.testing.assert_allclose(correlation(moved=1.0, left=4.0, gusts=0.0), 0.0)
+    np.testing.assert_allclose(correlation(moved=1.0, left=4.0, gusts=0.25)[:2], ANSWERED)
 
 
 def test_a_surface_that_never_moved_says_nothing() -> None:
-    np.testing.assert_allclose(correlation(moved=0.0, left=4.0), ALLOWED)
+    np.testing.assert_allclose(correlation(moved=0.0, left=4.0)[:2], 0.0)

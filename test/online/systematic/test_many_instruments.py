@@ -4,29 +4,50 @@ from __future__ import annotations
 
 import numpy as np
 
-from sysid_node.online.systematic.many_instruments import Scores
+from sysid_node.online.systematic.many_instruments import KEPT, Scores, share_taken_up
 
 ROWS, INSTRUMENTS, RUNS = 200, 20, 300
 TRUE = 0.7
 
 
-def drawn(random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Instruments (ROWS, INSTRUMENTS), a sensitivity and a residual (ROWS,) whose noise is correlated with it."""
-    instruments = random.standard_normal((ROWS, INSTRUMENTS))
+def drawn(random: np.random.Generator, answered: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Instruments (ROWS, INSTRUMENTS), a sensitivity and a residual (ROWS,) whose noise is correlated with it.
+
+    ``answered``: the correlation of each instrument with the sensitivity's noise.
+    """
     noise = random.standard_normal((ROWS, 2))
+    on_purpose = random.standard_normal((ROWS, INSTRUMENTS))
+    instruments = on_purpose + answered * noise[:, :1]
     residual_noise = 0.8 * noise[:, 0] + 0.6 * noise[:, 1]
-    sensitivity = instruments @ np.full(INSTRUMENTS, 0.15) + noise[:, 0]
+    sensitivity = on_purpose @ np.resize([0.15, -0.15], INSTRUMENTS) + noise[:, 0]
     return instruments, sensitivity, residual_noise - sensitivity * TRUE
 
 
-def scores_of(random: np.random.Generator) -> Scores:
-    """The sums over one equation."""
-    instruments, sensitivity, residual = drawn(random)
+def scores_of(random: np.random.Generator, answered: float = 0.0, allowed: float = 0.0) -> Scores:
+    """The sums over one equation, where a correlation is ``allowed`` for."""
+    instruments, sensitivity, residual = drawn(random, answered)
     D, both = sensitivity[None], np.column_stack([sensitivity, residual])
     q = np.linalg.qr(instruments)[0].T @ both
     scores = Scores.none(1)
-    scores.add(q[:, :1].T @ q, D @ both, INSTRUMENTS / ROWS, 1.0)
+    scores.add(q[:, :1].T @ q, D @ both, share_taken_up(INSTRUMENTS, INSTRUMENTS, ROWS, allowed), 1.0)
     return scores
+
+
+def mean_estimate(answered: float, allowed: float) -> float:
+    """Over all runs."""
+    random, found = np.random.default_rng(4), []
+    for _ in range(RUNS):
+        information, score = scores_of(random, answered, allowed).weighed()
+        found.append(-score[0] / information[0, 0])
+    return float(np.mean(found))
+
+
+def test_instruments_that_answer_gusts_keep_more_of_them() -> None:
+    """What is allowed for is so much more than the correlation as the mean square is less than the largest."""
+    answered = 0.08
+    without, with_it = (mean_estimate(answered, allowed) - TRUE for allowed in (0.0, answered / KEPT**0.5))
+    assert abs(without) > 0.1
+    assert abs(with_it) < 0.3 * abs(without)
 
 
 def test_estimate_is_without_the_bias_of_two_stage_least_squares_and_its_error_is_the_scatter():
