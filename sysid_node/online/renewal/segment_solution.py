@@ -193,7 +193,6 @@ def _systematic(
             corrected.solution,
             corrected.spread,
             corrected.inflation,
-            corrected.answered,
             correction,
             _noise_of_regressors(state, signals, corrected.noise),
         ),

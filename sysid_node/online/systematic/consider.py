@@ -30,7 +30,7 @@ moments' residuals, and a smaller moment of inertia would seem to explain noise.
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -42,7 +42,7 @@ from sysid_node.online.regression.least_squares import RIDGE, TINY, Solution, mi
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.systematic.column_changes import ColumnChanges
 from sysid_node.online.systematic.corrected_signals import CorrectedSignals
-from sysid_node.online.systematic.many_instruments import Scores, share_taken_up
+from sysid_node.online.systematic.many_instruments import EquationSums, Scores
 
 Array = NDArray[np.float64]
 
@@ -136,10 +136,17 @@ class _Sensitivities(NamedTuple):
 class _Findings(NamedTuple):
     """What the exogenous signals find of the imperfections in the residuals of C equations."""
 
-    scores: Scores
+    equations: list[EquationSums]
     misfit: Array  # (C,) see ``Considered``
     explained: Array  # (C,) see ``Fit``
     moves: NDArray[np.bool_]  # (C,) coefficients that are more than rounding
+
+    def scores(self, shares: Sequence[float]) -> Scores:
+        """The sums over all equations, of each of which a share of the noise is taken up."""
+        found = Scores.none(self.equations[0].whole.shape[0] - 1 if self.equations else 0)
+        for of_one, share in zip(self.equations, shares, strict=True):
+            found.add(of_one, share)
+        return found
 
 
 def consider(
@@ -150,23 +157,24 @@ def consider(
     place: NDArray[np.intp],
     beliefs: Beliefs,
     freedom: Array,
-    answered: Array,
     noise_gram: Array | None = None,
 ) -> Generator[None, None, Considered]:
     """From the corrected ``signals`` and their ``solution``; ``noise`` (C,) is per unit of the Gram matrix.
 
     ``place`` (W,): where the columns of the regression stand among the signals. ``freedom`` (C,) are the noise's
-    degrees of freedom; ``answered`` (C,): see ``gust_correlation.of_solution``. ``noise_gram`` (W, W): the Gram matrix
-    of the regressors' noise that the ``solution`` was freed of. It is made in two steps (``state.Steps``).
+    degrees of freedom. ``noise_gram`` (W, W): the Gram matrix of the regressors' noise that the ``solution`` was
+    freed of. It is made in three steps (``state.Steps``).
     """
     sigmas = beliefs.sigmas
     of_each = _sensitivities(equations, solution, signals, place, sigmas, noise_gram)
     yield
-    found = _findings(
-        equations, of_each.residuals, noise, signals, place, freedom, answered, freed=noise_gram is not None
-    )
+    found = _findings(equations, of_each.residuals, noise, signals, place, freedom, freed=noise_gram is not None)
     off = (beliefs.centre - signals.estimate) / sigmas
-    step, covariance = _posterior(*found.scores.weighed(), off, beliefs.precision)
+    by_chance = found.scores([of_one.by_chance for of_one in found.equations])
+    step, _ = _posterior(*by_chance.weighed(), off, beliefs.precision)
+    yield
+    measured = found.scores([of_one.share_taken_up(step) for of_one in found.equations])
+    step, covariance = _posterior(*measured.weighed(), off, beliefs.precision)
     jacobian = _jacobian(equations, signals.changes, of_each.v, of_each.J, sigmas, signals.corrected_means)
     return Considered(
         signals.estimate + sigmas * step,
@@ -217,7 +225,6 @@ def _findings(
     signals: CorrectedSignals,
     place: NDArray[np.intp],
     freedom: Array,
-    answered: Array,
     *,
     freed: bool,
 ) -> _Findings:
@@ -227,18 +234,19 @@ def _findings(
     """
     structure, gram = equations.structure, signals.gram
     C = len(structure.coefficients)
-    scores, misfit, explained = Scores.none(residuals.shape[1] - 1), np.ones(C), np.zeros(C)
+    equations_found, misfit, explained = list[EquationSums](), np.ones(C), np.zeros(C)
     moves = gram.diagonal()[place[equations.outputs]] > STILL**2 * signals.information.energy
     for block in range(int(structure.block.max()) + 1):
         project = _projection(equations, signals.changes, place, gram, block, freed=freed)
         for c in np.flatnonzero((structure.block == block) & (noise > 0.0) & moves).tolist():
-            q, D = project @ residuals[c].T, residuals[c, :-1]
+            q = project @ residuals[c].T
+            projected, whole = q.T @ q, residuals[c] @ gram @ residuals[c].T
             further = project.shape[0] - int(structure.belongs[:, c].sum())  # than the unknowns take
-            explained[c] = float(q[:, -1] @ q[:, -1])
+            explained[c] = projected[-1, -1]
             misfit[c] = max(float(explained[c]) / (float(noise[c]) * max(further, 1)), 1.0)
-            share = share_taken_up(project.shape[0], further, float(freedom[c]), float(answered[c]))
-            scores.add(q[:, :-1].T @ q, D @ gram @ residuals[c].T, share, float(noise[c] * misfit[c]))
-    return _Findings(scores, misfit, explained, moves)
+            by_chance = further / max(float(freedom[c]), 1.0)
+            equations_found.append(EquationSums(projected, whole, by_chance, float(noise[c] * misfit[c])))
+    return _Findings(equations_found, misfit, explained, moves)
 
 
 def _by_the_model(

@@ -7,11 +7,11 @@ correlated: the gust's moment is in r, the motion that it causes in D. The score
     E[D'Pr] = alpha E[D'r],        alpha = (E - p) / nu,
 
 with the p signals that the unknowns take of the E, and nu degrees of freedom of the noise. It does not vanish with
-more data. In turbulence it makes servos seem faster than they are. Where the deflections answer gusts, P keeps more
-than that: E times the mean square of the correlation between one signal and gusts, which is a share of the largest that
-is allowed for (``gust_correlation``), is the ratio of what is kept to what is not (``share_taken_up``). Without it, air
-data seem early where gusts turn the air: such air acts on the moments in proportion to the flow angles' rates. The mean
-is subtracted, as Nagar does (Econometrica 27, 1959; a k-class estimator with k = 1 / (1 - alpha)):
+more data. In turbulence it makes servos seem faster than they are. Where an autopilot answers gusts with the surfaces,
+P keeps more than that, and air data seem early: air that turns acts on the moments in proportion to the flow angles'
+rates. So alpha is no less than the share r'Pr / r'r that P keeps of the residual itself (limited information maximum
+likelihood: Anderson & Rubin, Annals of Mathematical Statistics 20, 1949). The mean is subtracted, as Nagar does
+(Econometrica 27, 1959; a k-class estimator with k = 1 / (1 - alpha)):
 
     s = D'(P - alpha I) r / (1 - alpha) / w,      Q = D'(P - alpha I) D / (1 - alpha) / w,      N = D'PD / w
 
@@ -29,23 +29,26 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Mean square of the correlation between an exogenous signal and gusts, over the square of what is allowed for.
-KEPT = 0.2
 LARGEST_SHARE = 0.9  # of the noise that the exogenous signals take up, from which on an equation tells nothing
 #: Variance of a score from which on a combination of imperfections counts. Under one the flight would tell less of it
 #: than its tolerance does, and what it seems to tell is mostly the noise that was not taken out.
 TELLING = 1.0
 
 
-def share_taken_up(signals: int, further: int, freedom: float, answered: float) -> float:
-    """Share of the noise that so many exogenous ``signals`` take up, ``further`` ones than the unknowns take.
+@dataclass(frozen=True)
+class EquationSums:
+    """Of one equation with K imperfections: products of its sensitivities and, behind them, its residual [D, r]."""
 
-    ``freedom``: the noise's degrees of freedom; ``answered``: the correlation between instruments and gusts that is
-    allowed for.
-    """
-    by_gusts = KEPT * signals * answered**2  # explained by the signals over not explained
-    kept = by_gusts / (1.0 + by_gusts)
-    return kept + (1.0 - kept) * further / max(freedom, 1.0)
+    projected: Array  # (K + 1, K + 1) [D, r]'P[D, r]
+    whole: Array  # (K + 1, K + 1) [D, r]'[D, r]
+    by_chance: float  # share of the noise that the exogenous signals take up by chance
+    noise: float  # its energy per unit of Gram matrix
+
+    def share_taken_up(self, step: Array) -> float:
+        """Share of the noise that the exogenous signals take up, as the residual after a ``step`` (K,) shows it."""
+        after = np.append(step, 1.0)
+        explained, energy = float(after @ self.projected @ after), float(after @ self.whole @ after)
+        return max(self.by_chance, explained / energy) if energy > 0.0 else self.by_chance
 
 
 @dataclass
@@ -61,15 +64,13 @@ class Scores:
         """Those of no equation, for ``count`` imperfections."""
         return cls(np.zeros((count, count)), np.zeros((count, count)), np.zeros(count))
 
-    def add(self, projected: Array, whole: Array, share: float, noise: float) -> None:
-        """Add an equation of which ``share`` of the noise is taken up; ``noise`` is its energy per unit of Gram matrix.
-
-        ``projected`` (K, K + 1): D'P[D, r]; ``whole`` (K, K + 1): D'[D, r].
-        """
+    def add(self, of_one: EquationSums, share: float) -> None:
+        """Add an equation of which a ``share`` of the noise is taken up."""
         if share >= LARGEST_SHARE:
             return
-        free = (projected - share * whole) / ((1.0 - share) * noise)
-        self.variance += projected[:, :-1] / noise
+        projected = of_one.projected[:-1]
+        free = (projected - share * of_one.whole[:-1]) / ((1.0 - share) * of_one.noise)
+        self.variance += projected[:, :-1] / of_one.noise
         self.slope += free[:, :-1]
         self.score += free[:, -1]
 
