@@ -64,7 +64,7 @@ def by_deflections(equations: NormalEquations, theta: Array, normal: Array, ener
     ratio = np.where(told, energy / np.where(told, moved, 1.0), 0.0)
     alike = structure.block[:, None] == structure.block
     of_block = np.where(alike, ratio[..., None, :], 0.0).max(axis=-1)
-    return np.minimum(ANSWERED * np.sqrt(of_block), 1.0)
+    return np.asarray(np.minimum(ANSWERED * np.sqrt(of_block), 1.0))
 
 
 def sensed(
