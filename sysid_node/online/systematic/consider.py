@@ -136,6 +136,7 @@ class _Sensitivities(NamedTuple):
 class _Findings(NamedTuple):
     """What the exogenous signals find of the imperfections in the residuals of C equations."""
 
+    imperfections: int  # K
     equations: list[EquationSums]
     misfit: Array  # (C,) see ``Considered``
     explained: Array  # (C,) see ``Fit``
@@ -143,7 +144,7 @@ class _Findings(NamedTuple):
 
     def scores(self, shares: Sequence[float]) -> Scores:
         """The sums over all equations, of each of which a share of the noise is taken up."""
-        found = Scores.none(self.equations[0].whole.shape[0] - 1 if self.equations else 0)
+        found = Scores.none(self.imperfections)
         for of_one, share in zip(self.equations, shares, strict=True):
             found.add(of_one, share)
         return found
@@ -157,18 +158,20 @@ def consider(
     place: NDArray[np.intp],
     beliefs: Beliefs,
     freedom: Array,
+    gusts: Array,
     noise_gram: Array | None = None,
 ) -> Generator[None, None, Considered]:
     """From the corrected ``signals`` and their ``solution``; ``noise`` (C,) is per unit of the Gram matrix.
 
     ``place`` (W,): where the columns of the regression stand among the signals. ``freedom`` (C,) are the noise's
-    degrees of freedom. ``noise_gram`` (W, W): the Gram matrix of the regressors' noise that the ``solution`` was
-    freed of. It is made in three steps (``state.Steps``).
+    degrees of freedom, ``gusts`` (C,) the share of the residuals that is not the sensors' noise. ``noise_gram`` (W, W):
+    the Gram matrix of the regressors' noise that the ``solution`` was freed of. It is made in three steps
+    (``state.Steps``).
     """
     sigmas = beliefs.sigmas
     of_each = _sensitivities(equations, solution, signals, place, sigmas, noise_gram)
     yield
-    found = _findings(equations, of_each.residuals, noise, signals, place, freedom, freed=noise_gram is not None)
+    found = _findings(equations, of_each.residuals, noise, signals, place, freedom, gusts, freed=noise_gram is not None)
     off = (beliefs.centre - signals.estimate) / sigmas
     by_chance = found.scores([of_one.by_chance for of_one in found.equations])
     step, _ = _posterior(*by_chance.weighed(), off, beliefs.precision)
@@ -225,6 +228,7 @@ def _findings(
     signals: CorrectedSignals,
     place: NDArray[np.intp],
     freedom: Array,
+    gusts: Array,
     *,
     freed: bool,
 ) -> _Findings:
@@ -244,9 +248,9 @@ def _findings(
             further = project.shape[0] - int(structure.belongs[:, c].sum())  # than the unknowns take
             explained[c] = projected[-1, -1]
             misfit[c] = max(float(explained[c]) / (float(noise[c]) * max(further, 1)), 1.0)
-            by_chance = further / max(float(freedom[c]), 1.0)
-            equations_found.append(EquationSums(projected, whole, by_chance, float(noise[c] * misfit[c])))
-    return _Findings(equations_found, misfit, explained, moves)
+            weight = float(noise[c] * misfit[c])
+            equations_found.append(EquationSums(projected, whole, further, float(freedom[c]), float(gusts[c]), weight))
+    return _Findings(residuals.shape[1] - 1, equations_found, misfit, explained, moves)
 
 
 def _by_the_model(

@@ -9,9 +9,9 @@ correlated: the gust's moment is in r, the motion that it causes in D. The score
 with the p signals that the unknowns take of the E, and nu degrees of freedom of the noise. It does not vanish with
 more data. In turbulence it makes servos seem faster than they are. Where an autopilot answers gusts with the surfaces,
 P keeps more than that, and air data seem early: air that turns acts on the moments in proportion to the flow angles'
-rates. So alpha is no less than the share r'Pr / r'r that P keeps of the residual itself (limited information maximum
-likelihood: Anderson & Rubin, Annals of Mathematical Statistics 20, 1949). The mean is subtracted, as Nagar does
-(Econometrica 27, 1959; a k-class estimator with k = 1 / (1 - alpha)):
+rates. So in gusts alpha is the share r'Pr / r'r that P keeps of the residual itself, where that is more than chance
+explains (limited information maximum likelihood: Anderson & Rubin, Annals of Mathematical Statistics 20, 1949). The
+mean is subtracted, as Nagar does (Econometrica 27, 1959; a k-class estimator with k = 1 / (1 - alpha)):
 
     s = D'(P - alpha I) r / (1 - alpha) / w,      Q = D'(P - alpha I) D / (1 - alpha) / w,      N = D'PD / w
 
@@ -22,6 +22,7 @@ information Q N^-1 Q and the score Q N^-1 s. Without noise in D all three matric
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: Standard deviations by which a residual's share must be larger than by chance to count (positive-part shrinkage).
+UNLIKELY = 2.0
 LARGEST_SHARE = 0.9  # of the noise that the exogenous signals take up, from which on an equation tells nothing
 #: Variance of a score from which on a combination of imperfections counts. Under one the flight would tell less of it
 #: than its tolerance does, and what it seems to tell is mostly the noise that was not taken out.
@@ -41,14 +44,29 @@ class EquationSums:
 
     projected: Array  # (K + 1, K + 1) [D, r]'P[D, r]
     whole: Array  # (K + 1, K + 1) [D, r]'[D, r]
-    by_chance: float  # share of the noise that the exogenous signals take up by chance
+    further: int  # number of exogenous signals beyond those that the unknowns take
+    freedom: float  # degrees of freedom of the noise
+    gusts: float  # share of the residual that is not the sensors' noise
     noise: float  # its energy per unit of Gram matrix
 
+    @property
+    def by_chance(self) -> float:
+        """Share of the noise that the exogenous signals take up by chance."""
+        return self.further / max(self.freedom, 1.0)
+
     def share_taken_up(self, step: Array) -> float:
-        """Share of the noise that the exogenous signals take up, as the residual after a ``step`` (K,) shows it."""
+        """Share of the noise that the exogenous signals take up, as the residual after a ``step`` (K,) shows it.
+
+        The less of the residual's share is beyond what chance explains, the less of it counts; and gusts alone are
+        answered.
+        """
         after = np.append(step, 1.0)
         explained, energy = float(after @ self.projected @ after), float(after @ self.whole @ after)
-        return max(self.by_chance, explained / energy) if energy > 0.0 else self.by_chance
+        chance = UNLIKELY * self.by_chance * math.sqrt(2.0 / max(self.further, 1))
+        excess = explained / energy - self.by_chance if energy > 0.0 else 0.0
+        if excess <= chance:
+            return self.by_chance
+        return self.by_chance + self.gusts * excess * (1.0 - (chance / excess) ** 2)
 
 
 @dataclass

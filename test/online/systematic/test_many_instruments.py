@@ -27,7 +27,7 @@ def sums(instruments: np.ndarray, sensitivity: np.ndarray, residual: np.ndarray)
     """Of one equation."""
     both = np.column_stack([sensitivity, residual])
     q = np.linalg.qr(instruments)[0].T @ both
-    return EquationSums(q.T @ q, both.T @ both, INSTRUMENTS / ROWS, 1.0)
+    return EquationSums(q.T @ q, both.T @ both, INSTRUMENTS, ROWS, 1.0, 1.0)
 
 
 def estimate(of_one: EquationSums, share: float) -> tuple[float, float]:
@@ -51,10 +51,19 @@ def bias(answered: float, *, measured: bool) -> float:
 
 
 def test_instruments_that_answer_gusts_keep_more_of_them_and_the_residual_shows_how_much() -> None:
-    """Two fifths of the residual's noise are not in the sensitivity, so that it shows less than is kept of both."""
-    without = bias(0.08, measured=False)
-    assert abs(without) > 0.1
-    assert abs(bias(0.08, measured=True)) < 0.6 * abs(without)
+    """It shows less than is kept of both: two fifths of its noise are not in the sensitivity."""
+    for answered in (0.08, 0.12):
+        without, with_it = (bias(answered, measured=measured) for measured in (False, True))
+        assert without < -0.1
+        assert 0.85 * without < with_it < 0.0
+
+
+def test_what_chance_may_explain_and_what_sensors_leave_keeps_nothing_more() -> None:
+    """The residual's share is 0.15, by chance 0.1 +- 0.045; then 0.4, in gusts and in still air."""
+    whole = np.diag([1.0, 1.0])
+    for explained, gusts, least, most in ((0.15, 1.0, 0.1, 0.1), (0.4, 1.0, 0.35, 0.4), (0.4, 0.0, 0.1, 0.1)):
+        of_one = EquationSums(np.diag([0.5, explained]), whole, 10, 100.0, gusts, 1.0)
+        assert least <= of_one.share_taken_up(np.zeros(1)) <= most
 
 
 def test_estimate_is_without_the_bias_of_two_stage_least_squares_and_its_error_is_the_scatter():
@@ -79,7 +88,7 @@ def test_what_the_flight_tells_less_of_than_the_tolerance_does_is_left_to_the_to
     scores = Scores.none(2)
     projected = np.array([[4.0, 0.0, -2.0], [0.0, 0.5, -0.4]])
     whole = np.vstack([projected, np.zeros(3)])
-    scores.add(EquationSums(whole, whole, 0.0, 1.0), 0.0)
+    scores.add(EquationSums(whole, whole, 0, 1.0, 1.0, 1.0), 0.0)
     information, score = scores.weighed()
     np.testing.assert_allclose(information, [[4.0, 0.0], [0.0, 0.0]], atol=1e-12)
     np.testing.assert_allclose(score, [-2.0, 0.0], atol=1e-12)
@@ -87,7 +96,9 @@ def test_what_the_flight_tells_less_of_than_the_tolerance_does_is_left_to_the_to
 
 def test_an_equation_whose_noise_is_taken_up_entirely_tells_nothing():
     scores = Scores.none(1)
-    of_one = EquationSums(np.array([[4.0, -2.0], [-2.0, 2.0]]), np.array([[5.0, -3.0], [-3.0, 2.0]]), 0.5, 1.0)
+    of_one = EquationSums(
+        np.array([[4.0, -2.0], [-2.0, 2.0]]), np.array([[5.0, -3.0], [-3.0, 2.0]]), 1, 200.0, 1.0, 1.0
+    )
     scores.add(of_one, of_one.share_taken_up(np.zeros(1)))
     information, score = scores.weighed()
     assert not information.any()
