@@ -31,6 +31,9 @@ from sysid_node.online.systematic.estimation import Rival, SystematicErrors
 from sysid_node.online.systematic.imperfections import CURVATURE
 
 FIRST, GROWTH = 8.0, 1.3  # s of data with which the first other solution is tried, and by what they grow to the next
+#: The same where deflections may be positions as well as commands: few data tell a late servo from a slow motion, and a
+#: servo that is not there is the likelier.
+FIRST_OF_EITHER = 20.0
 LATE, BETWEEN = 0.12, 0.06  # s: where a servo is taken to be that is nearer to zero than the second
 STEPS = 4  # at most, from there
 SURELY = 2.0  # difference of -2 log p with which a solution is taken for another
@@ -45,7 +48,8 @@ def try_another_solution(state: EstimatorState) -> Steps[None]:
     if imperfect is None or found is None or not imperfect.unknown.size or found.pieces != state.finished.pieces:
         return
     energy = found.energy
-    if energy < FIRST or search.energy <= energy < GROWTH * search.energy:
+    first = FIRST if imperfect.expected[imperfect.unknown].any() else FIRST_OF_EITHER
+    if energy < first or search.energy <= energy < GROWTH * search.energy:
         return
     control = int(imperfect.unknown[search.tried % imperfect.unknown.size])
     search.energy, search.tried = energy, search.tried + 1
