@@ -193,7 +193,7 @@ def _systematic(
             corrected.solution,
             corrected.spread,
             corrected.inflation,
-            corrected.answered,
+            corrected.gusts,
             correction,
             _noise_of_regressors(state, signals, corrected.noise),
         ),

@@ -34,7 +34,7 @@ class SolvedEquations(NamedTuple):
     noise: Array | None  # (W, W) of which that was made, per line and second
     spread: Uncertainty
     inflation: Array  # (C,) factors of the variances by gusts
-    answered: Array  # (C,) correlation between instruments and gusts by the deflections
+    gusts: Array  # (C,) share of the residuals that is not the sensors' noise
     sensed: Array  # (C,) density of the sensors' noise in the residuals
     instruments: InstrumentChecks
 
@@ -52,7 +52,7 @@ def solved_equations(state: EstimatorState, total: Information, gram: Array) -> 
     checks = _instrument_checks(state, total, gram, strength, solution, spread, noise_alone, gusts)
     answered = gust_correlation.of_solution(equations, solution, gram, gusts)
     inflation = gust_correlation.inflation(spread, gusts, answered)
-    return SolvedEquations(solution, compensation, noise, spread, inflation, answered, sensed, checks)
+    return SolvedEquations(solution, compensation, noise, spread, inflation, gusts, sensed, checks)
 
 
 def _solve(

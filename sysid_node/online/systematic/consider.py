@@ -158,21 +158,20 @@ def consider(
     place: NDArray[np.intp],
     beliefs: Beliefs,
     freedom: Array,
-    answered: Array,
+    gusts: Array,
     noise_gram: Array | None = None,
 ) -> Generator[None, None, Considered]:
     """From the corrected ``signals`` and their ``solution``; ``noise`` (C,) is per unit of the Gram matrix.
 
     ``place`` (W,): where the columns of the regression stand among the signals. ``freedom`` (C,) are the noise's
-    degrees of freedom; ``answered`` (C,): see ``gust_correlation.of_solution``. ``noise_gram`` (W, W): the Gram matrix
-    of the regressors' noise that the ``solution`` was freed of. It is made in three steps (``state.Steps``).
+    degrees of freedom, ``gusts`` (C,) the share of the residuals that is not the sensors' noise. ``noise_gram`` (W, W):
+    the Gram matrix of the regressors' noise that the ``solution`` was freed of. It is made in three steps
+    (``state.Steps``).
     """
     sigmas = beliefs.sigmas
     of_each = _sensitivities(equations, solution, signals, place, sigmas, noise_gram)
     yield
-    found = _findings(
-        equations, of_each.residuals, noise, signals, place, freedom, answered, freed=noise_gram is not None
-    )
+    found = _findings(equations, of_each.residuals, noise, signals, place, freedom, gusts, freed=noise_gram is not None)
     off = (beliefs.centre - signals.estimate) / sigmas
     by_chance = found.scores([of_one.by_chance for of_one in found.equations])
     step, _ = _posterior(*by_chance.weighed(), off, beliefs.precision)
@@ -229,7 +228,7 @@ def _findings(
     signals: CorrectedSignals,
     place: NDArray[np.intp],
     freedom: Array,
-    answered: Array,
+    gusts: Array,
     *,
     freed: bool,
 ) -> _Findings:
@@ -250,9 +249,7 @@ def _findings(
             explained[c] = projected[-1, -1]
             misfit[c] = max(float(explained[c]) / (float(noise[c]) * max(further, 1)), 1.0)
             weight = float(noise[c] * misfit[c])
-            equations_found.append(
-                EquationSums(projected, whole, further, float(freedom[c]), float(answered[c]), weight)
-            )
+            equations_found.append(EquationSums(projected, whole, further, float(freedom[c]), float(gusts[c]), weight))
     return _Findings(residuals.shape[1] - 1, equations_found, misfit, explained, moves)
 
 

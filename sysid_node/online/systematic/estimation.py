@@ -89,7 +89,7 @@ class CorrectedSolution:
     inflation: (
         Array  # (C,) factors of the statistical variances, which hold for what the flight tells of imperfections too
     )
-    answered: Array  # (C,) correlation between instruments and gusts by the deflections
+    gusts: Array  # (C,) share of the residuals that is not the sensors' noise
     correction: Array  # (C, P + 1) by which the solution differs from that of the recorded signals
     noise_gram: Array | None  # (W, W) Gram matrix of the regressors' noise that it was freed of
 
@@ -119,7 +119,7 @@ def systematic_errors(
         imperfect.places,
         beliefs,
         spread.freedom,
-        solved.answered,
+        solved.gusts,
         solved.noise_gram,
     )
     share = min(share, LARGEST_STEP / max(float(np.abs(found.step[imperfect.servos]).max(initial=0.0)), LARGEST_STEP))

@@ -9,10 +9,9 @@ correlated: the gust's moment is in r, the motion that it causes in D. The score
 with the p signals that the unknowns take of the E, and nu degrees of freedom of the noise. It does not vanish with
 more data. In turbulence it makes servos seem faster than they are. Where an autopilot answers gusts with the surfaces,
 P keeps more than that, and air data seem early: air that turns acts on the moments in proportion to the flow angles'
-rates. So alpha is the share r'Pr / r'r that P keeps of the residual itself, where that is more than chance explains
-(limited information maximum likelihood: Anderson & Rubin, Annals of Mathematical Statistics 20, 1949), and no more than
-deflections that answer gusts can make of it (``gust_correlation``). The mean is subtracted, as Nagar does (Econometrica
-27, 1959; a k-class estimator with k = 1 / (1 - alpha)):
+rates. So in gusts alpha is the share r'Pr / r'r that P keeps of the residual itself, where that is more than chance
+explains (limited information maximum likelihood: Anderson & Rubin, Annals of Mathematical Statistics 20, 1949). The
+mean is subtracted, as Nagar does (Econometrica 27, 1959; a k-class estimator with k = 1 / (1 - alpha)):
 
     s = D'(P - alpha I) r / (1 - alpha) / w,      Q = D'(P - alpha I) D / (1 - alpha) / w,      N = D'PD / w
 
@@ -47,7 +46,7 @@ class EquationSums:
     whole: Array  # (K + 1, K + 1) [D, r]'[D, r]
     further: int  # number of exogenous signals beyond those that the unknowns take
     freedom: float  # degrees of freedom of the noise
-    answered: float  # correlation between one exogenous signal and gusts, at most
+    gusts: float  # share of the residual that is not the sensors' noise
     noise: float  # its energy per unit of Gram matrix
 
     @property
@@ -58,8 +57,8 @@ class EquationSums:
     def share_taken_up(self, step: Array) -> float:
         """Share of the noise that the exogenous signals take up, as the residual after a ``step`` (K,) shows it.
 
-        The less of the residual's share is beyond what chance explains, the less of it counts. No more counts than
-        gusts can make of it, if every exogenous signal is correlated with them as much as it may be.
+        The less of the residual's share is beyond what chance explains, the less of it counts; and gusts alone are
+        answered.
         """
         after = np.append(step, 1.0)
         explained, energy = float(after @ self.projected @ after), float(after @ self.whole @ after)
@@ -67,8 +66,7 @@ class EquationSums:
         excess = explained / energy - self.by_chance if energy > 0.0 else 0.0
         if excess <= chance:
             return self.by_chance
-        by_gusts = (self.further + 1) * self.answered**2  # explained over not explained
-        return self.by_chance + min(excess * (1.0 - (chance / excess) ** 2), by_gusts / (1.0 + by_gusts))
+        return self.by_chance + self.gusts * excess * (1.0 - (chance / excess) ** 2)
 
 
 @dataclass
