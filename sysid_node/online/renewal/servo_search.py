@@ -32,7 +32,7 @@ from sysid_node.online.systematic.imperfections import CURVATURE
 
 FIRST, GROWTH = 8.0, 1.3  # s of data with which the first other solution is tried, and by what they grow to the next
 #: The same where deflections may be positions as well as commands: few data tell a late servo from a slow motion, and
-#: that no servo comes after the deflections is more probable.
+#: positions, after which no servo comes, are as probable.
 FIRST_OF_EITHER = 20.0
 LATE, BETWEEN = 0.12, 0.06  # s: where a servo is taken to be that is nearer to zero than the second
 STEPS = 4  # at most, from there
