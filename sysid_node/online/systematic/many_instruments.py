@@ -57,8 +57,8 @@ class EquationSums:
     def share_taken_up(self, step: Array) -> float:
         """Share of the noise that the exogenous signals take up, as the residual after a ``step`` (K,) shows it.
 
-        The less of the residual's share is beyond what chance explains, the less of it counts. It counts by the share of
-        gusts in the residual, because the surfaces do not answer the sensors' noise.
+        The less of the residual's share is beyond what chance explains, the less of it counts. It counts by the share
+        of gusts in the residual, because the surfaces do not answer the sensors' noise.
         """
         after = np.append(step, 1.0)
         explained, energy = float(after @ self.projected @ after), float(after @ self.whole @ after)
