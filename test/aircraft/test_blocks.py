@@ -173,7 +173,7 @@ def test_inertias_of_no_rigid_body_are_a_warning_in_a_simulators_file():
 def test_a_right_file_gives_no_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        parse_aircraft("ideal: true\n" + GOOD)
+        assert parse_aircraft("ideal: true\n" + GOOD).ideal
 
 
 # what to replace, by what, and what the one line must hold

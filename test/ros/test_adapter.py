@@ -125,6 +125,25 @@ def test_whatever_an_autopilot_sends_it_goes_on(
     imu.publish(serialize_message(Imu(header=header))[:-9])
     for _ in range(6):
         rclpy.spin_once(node, timeout_sec=0.002)
+    assert rclpy.ok()
+
+
+def test_after_all_that_it_still_passes_on_what_is_sound(
+    standard: tuple[AdapterNode, Any, Any], probe: Probe
+) -> None:
+    node, imu, _ = standard
+    heard: list[Imu] = []
+    probe.node.create_subscription(Imu, "imu/data", heard.append, 10)
+    sound = Imu(header=conversion.header(STAMP, "base_link"), linear_acceleration=Vector3(z=9.75))
+
+    def passed_on() -> bool:
+        imu.publish(sound)
+        rclpy.spin_once(node, timeout_sec=0.05)
+        probe.spin(0.05)
+        return any(message.linear_acceleration == sound.linear_acceleration for message in heard)
+
+    probe.until(passed_on)
+    assert {conversion.stamp_ns(message.header.stamp) for message in heard} == {STAMP}
 
 
 @settings(max_examples=100, deadline=None)

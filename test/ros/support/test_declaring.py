@@ -50,7 +50,11 @@ def test_a_value_of_a_wrong_type_is_refused_over_a_file(tmp_path: Path, rule: st
 
 @pytest.mark.parametrize("rule", ["adapt:=false", "adapt:=n", "gain:=1e3", "gain:=.5", "other:adapt:=0", "unknown:=0"])
 def test_right_values_pass(tmp_path: Path, rule: str) -> None:
-    refuse_mistyped(arguments(tmp_path, FILE, "-p", rule), "/uav1/node", TABLE)
+    """The last value is refused all the same: the one before it was looked at, and passed."""
+    given = arguments(tmp_path, FILE, "-p", rule)
+    refuse_mistyped(given, "/uav1/node", TABLE)
+    with pytest.raises(InputError, match="parameter method = 1: "):
+        refuse_mistyped([*given, "-p", "method:=1"], "/uav1/node", TABLE)
 
 
 @pytest.mark.parametrize(
