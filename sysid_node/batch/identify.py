@@ -28,6 +28,8 @@ from sysid_node.batch.results.response import ModelResponse
 from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.batch.systematic.flight_posterior import FlightPosterior, flight_posterior
+from sysid_node.batch.systematic.gust_bias import with_gust_bias
+from sysid_node.batch.systematic.online_passes import OnlineEstimate, online_estimates, online_passes
 from sysid_node.batch.systematic.sensitivities import LikelihoodResponse, RegressionResponse, Response
 from sysid_node.batch.systematic.stated_errors import without_stated_errors
 from sysid_node.batch.systematic.systematic_errors import on_time, with_systematic_errors
@@ -46,6 +48,8 @@ _REGRESSIONS: dict[str, Callable[[Aircraft, Sequence[FlightRecord], BatchSetting
 #: Methods that integrate a model.
 _SEARCHES = ("output_error", "filter_error")
 METHODS = (*_REGRESSIONS, *_SEARCHES, *KALMAN_FILTERS)
+#: Methods that gusts do not bias: they estimate the motion of the air.
+_STANDS_GUSTS = frozenset({"filter_error"})
 
 #: Of regressions that do not weigh all of the signals alike: low-pass (Hz), and the share of its weight that a sample
 #: keeps in a second.
@@ -119,6 +123,7 @@ class _PreparedFlights:
     records: Sequence[FlightRecord]  # with corrected clocks
     holdout: Sequence[FlightRecord]
     posterior: FlightPosterior | None  # of the imperfections
+    online: Mapping[str, OnlineEstimate]
     selections: Mapping[str, StepwiseSelection]
     remarks: Sequence[str]
 
@@ -142,13 +147,17 @@ def _prepared(
         aircraft, selections = supported_model(aircraft, records, settings.low_pass)
         left_out = [name for name in before if name not in aircraft.derivatives]
         remarks.append(f"stepwise regression left out {', '.join(left_out) or 'nothing'}")
-    posterior = flight_posterior(aircraft, records, settings)
+    passes = online_passes(aircraft, records, settings)
+    posterior = flight_posterior(passes)
     recorded = records
     if posterior is not None:
         records, holdout = on_time(aircraft, records, posterior), on_time(aircraft, holdout, posterior)
     elif _uncertain(aircraft):
         remarks.append(_NOT_CONSIDERED)
-    return _PreparedFlights(with_places_from_cg(aircraft), recorded, records, holdout, posterior, selections, remarks)
+    online = online_estimates(passes)
+    return _PreparedFlights(
+        with_places_from_cg(aircraft), recorded, records, holdout, posterior, online, selections, remarks
+    )
 
 
 def _fitted_with_systematic_errors(
@@ -158,8 +167,7 @@ def _fitted_with_systematic_errors(
     aircraft, records = flights.aircraft, flights.records
     try:
         fit, predict, response = _fitted(method, aircraft, records, settings)
-        if flights.posterior is not None:
-            fit = with_systematic_errors(aircraft, flights.recorded, fit, flights.posterior, response())
+        fit = _with_other_errors(fit, flights, response, stands_gusts=method in _STANDS_GUSTS)
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         names = ", ".join(record.name for record in records)
         raise InputError(
@@ -167,6 +175,23 @@ def _fitted_with_systematic_errors(
             "model: give flights that excite it, or a simpler model"
         ) from error
     return fit, predict
+
+
+def _with_other_errors(
+    fit: BatchFit, flights: _PreparedFlights, response: Callable[[], Response], *, stands_gusts: bool
+) -> BatchFit:
+    """The fit with intervals that hold what gusts do to the method, and what the tolerances leave open."""
+    if flights.posterior is not None:
+        return with_systematic_errors(
+            flights.aircraft,
+            flights.recorded,
+            fit,
+            flights.posterior,
+            response(),
+            flights.online,
+            stands_gusts=stands_gusts,
+        )
+    return fit if stands_gusts else with_gust_bias(fit, flights.online, np.zeros(len(fit.estimates)))
 
 
 def refuse_unused(method: str, settings: Mapping[str, object]) -> None:

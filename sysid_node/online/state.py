@@ -157,6 +157,7 @@ class SegmentSolution:
     later: LaterEstimates
     instruments: InstrumentChecks
     tests: ModelTests
+    gusts: Array  # (C,) share of the residuals that is not the sensors' noise
     systematic: SystematicErrors | None = None  # None where all is exact
     basis: ValidityBasis | None = None  # made when first wanted
     published: PublishedImperfections | None = None  # made when first wanted

@@ -49,6 +49,14 @@ class ParameterEstimate:
             systematic_error=systematic,
         )
 
+    def widened(self, error: float) -> ParameterEstimate:
+        """The same estimate with one more statistical standard ``error`` in its standard error and interval."""
+        below, above = (
+            math.hypot(arm, NORMAL_95 * error) for arm in (self.value - self.lower, self.upper - self.value)
+        )
+        total = math.hypot(self.standard_error, error)
+        return replace(self, standard_error=total, lower=self.value - below, upper=self.value + above)
+
     def invalid(self, status: str) -> ParameterEstimate:
         """The same estimate marked as not valid, for the reason ``status``."""
         return replace(self, valid=False, status=status)

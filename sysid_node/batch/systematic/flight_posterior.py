@@ -14,25 +14,16 @@ all steps together, and a derivative may rest on a single one: that time is adde
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from sysid_node.aircraft.model import Aircraft
-from sysid_node.batch.settings import BatchSettings
-from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.online import estimator
-from sysid_node.online.estimates.published import estimate
-from sysid_node.online.settings import LONGEST_GAP, OnlineSettings
+from sysid_node.flight.record import Array
 from sysid_node.online.state import EstimatorState
 from sysid_node.online.systematic.estimation import SystematicErrors
 from sysid_node.online.systematic.imperfections import Imperfections, prior
-from sysid_node.online.types import SAMPLE_COLUMNS
-
-APART = 2.0 * LONGEST_GAP  # s between flights: the estimator begins a segment after such a gap
 
 
 class Imperfection(NamedTuple):
@@ -64,7 +55,6 @@ class FlightPosterior:
     covariance: Array  # (K, K)
     names: tuple[str, ...]
     jacobian: Array
-    online: Mapping[str, tuple[float, float]]  # valid estimates of the online estimator: value, standard error
 
     @property
     def errors(self) -> Array:
@@ -85,38 +75,12 @@ class _OneFlight(NamedTuple):
     jacobian: Array  # (K, D) per unit
     seconds: float
     step_time: float  # s, 1 sigma of the time of a step in the commands
-    online: Mapping[str, tuple[float, float]]
 
 
-def flight_posterior(
-    aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings
-) -> FlightPosterior | None:
-    """The posterior of all ``records`` together; None where the file states that all is exact, or none can be used."""
-    online = OnlineSettings(actuators=settings.actuators, max_gap=min(settings.max_gap, 5.0), detect_changes=False)
-    alike = [[one for one in records if one.commanded == commanded] for commanded in (False, True)]
-    told = [one for some in alike if some and (one := _told(_passed(aircraft, some, online))) is not None]
+def flight_posterior(passes: Sequence[EstimatorState]) -> FlightPosterior | None:
+    """The posterior after the ``online_passes`` of all flights; None where all is exact, or none can be used."""
+    told = [one for state in passes if (one := _told(state)) is not None]
     return _combined(told) if told else None
-
-
-def _passed(aircraft: Aircraft, records: Sequence[FlightRecord], settings: OnlineSettings) -> EstimatorState:
-    """The online estimator after flights that are alike in what was recorded of the controls, as if they were one."""
-    slowest = max(record.command_interval for record in records)
-    state = estimator.init(aircraft, settings, commanded=records[0].commanded, command_interval=slowest)
-    begin = 0.0
-    for record in records:
-        # each flight has its own beginning, and tells whether its thrust is known
-        state.inputs.begin, state.inputs.thrust_known = math.nan, None
-        interval = record.air_interval or float(np.median(np.diff(record.time)))
-        density = np.where(np.isfinite(record["rho"]), record["rho"], aircraft.reference.air_density)
-        made = {"air_interval": np.full(len(record), interval), "rho": density}
-        names = (*SAMPLE_COLUMNS, *aircraft.control_symbols)
-        samples = np.column_stack([made[name] if name in made else record[name] for name in names])
-        times = record.time - record.time[0] + begin
-        for time, sample in zip(times.tolist(), samples.tolist(), strict=True):
-            estimator.update(state, time, sample)
-        estimator.interrupt(state)
-        begin = float(times[-1]) + APART
-    return state
 
 
 def _told(state: EstimatorState) -> _OneFlight | None:
@@ -139,7 +103,6 @@ def _told(state: EstimatorState) -> _OneFlight | None:
         jacobian.reshape(sigmas.size, -1)[:, table.place],
         latest.total.energy,
         imperfect.step_time,
-        {name: (d.value, d.standard_error) for name, d in estimate(state).derivatives.items() if d.valid},
     )
 
 
@@ -183,11 +146,4 @@ def _combined(told: Sequence[_OneFlight]) -> FlightPosterior:
         sigmas[:, None] * covariance * sigmas + np.diag(step_time**2 * late),
         told[0].names,
         jacobian / np.maximum(weight, 1e-9)[:, None],
-        {n: _together(found) for n in told[0].names if (found := [one.online[n] for one in told if n in one.online])},
     )
-
-
-def _together(found: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """The mean of values by their standard errors, and the smallest of these: tolerances are common to all flights."""
-    weights = np.array([1.0 / max(error, 1e-300) ** 2 for _, error in found])
-    return float(np.average([value for value, _ in found], weights=weights)), min(error for _, error in found)

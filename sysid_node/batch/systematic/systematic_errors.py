@@ -21,9 +21,11 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.stated_effects import stated_cg
 from sysid_node.batch.results.batch_fit import BatchFit, SystematicPart
-from sysid_node.batch.results.estimate import NORMAL_95, ParameterEstimate, confidence_interval
+from sysid_node.batch.results.estimate import ParameterEstimate, confidence_interval
 from sysid_node.batch.systematic.clocks import LATE_COLUMNS, corrected, is_timing
 from sysid_node.batch.systematic.flight_posterior import FlightPosterior, Imperfection
+from sysid_node.batch.systematic.gust_bias import compared, with_gust_bias
+from sysid_node.batch.systematic.online_passes import OnlineEstimate
 from sysid_node.batch.systematic.perturbations import perturbed
 from sysid_node.batch.systematic.sensitivities import RegressionResponse, Response
 from sysid_node.flight.record import Array, FlightRecord
@@ -31,7 +33,6 @@ from sysid_node.online.estimates.published import SERVO_KNOWN
 from sysid_node.online.systematic.budget import Budget
 
 SMALLEST = 1e-6  # s, or s^2: of a step
-CONTRADICTION = 2.0  # standard errors of both estimates together by which they differ at most
 
 
 def on_time(aircraft: Aircraft, records: Sequence[FlightRecord], posterior: FlightPosterior) -> list[FlightRecord]:
@@ -40,20 +41,31 @@ def on_time(aircraft: Aircraft, records: Sequence[FlightRecord], posterior: Flig
 
 
 def with_systematic_errors(
-    aircraft: Aircraft, records: Sequence[FlightRecord], fit: BatchFit, posterior: FlightPosterior, response: Response
+    aircraft: Aircraft,
+    records: Sequence[FlightRecord],
+    fit: BatchFit,
+    posterior: FlightPosterior,
+    response: Response,
+    online: Mapping[str, OnlineEstimate],
+    *,
+    stands_gusts: bool = True,
 ) -> BatchFit:
     """The ``fit`` to the records ``on_time``, moved by all other imperfections, with intervals that hold them all.
 
-    ``records`` are those before any correction; ``response`` says how the method's estimates move.
+    ``records`` are those before any correction; ``response`` says how the method's estimates move. Estimates that a
+    valid one of the ``online`` estimator contradicts are not valid. ``stands_gusts``: whether gusts do not bias the
+    method; otherwise its intervals hold that bias, too.
     """
     names = tuple(fit.estimates)
     G = _jacobian(aircraft, records, names, posterior, response)
     others = np.array([not is_timing(one) for one in posterior.imperfections])
     moved = ((posterior.mean - _taken_into_account(aircraft, posterior)) * others) @ G
+    if not stands_gusts:
+        fit = with_gust_bias(fit, online, moved)
     systematic = G.T @ posterior.covariance @ G
     errors = np.sqrt(np.maximum(np.diag(systematic), 0.0))
     estimates = {
-        name: _compared(estimate.with_systematic(float(error), float(by)), posterior.online.get(name))
+        name: compared(estimate.with_systematic(float(error), float(by)), online.get(name))
         for (name, estimate), error, by in zip(fit.estimates.items(), errors, moved, strict=True)
     }
     keys = tuple(one.key for one in posterior.imperfections)
@@ -78,20 +90,6 @@ def _taken_into_account(aircraft: Aircraft, posterior: FlightPosterior) -> Array
     """(K,) values that the methods have from the file already: where it states the CG."""
     shift = {f"cg_shift.{axis}": value for axis, value in zip("xyz", stated_cg(aircraft), strict=True)}
     return np.array([shift.get(one.key, 0.0) for one in posterior.imperfections])
-
-
-def _compared(estimate: ParameterEstimate, online: tuple[float, float] | None) -> ParameterEstimate:
-    """The estimate, not valid where the online estimator contradicts it.
-
-    Both have the same flights and tolerances. Gusts, and times that are off by more than a linear correction can
-    mend, bias most methods; the online estimator's instruments and iterated servos stand more of both.
-    """
-    if online is None or not estimate.valid:
-        return estimate
-    value, error = online
-    if abs(estimate.value - value) <= CONTRADICTION * float(np.hypot(estimate.standard_error, error)):
-        return estimate
-    return estimate.invalid(f"contradicted: the online estimator finds {value:.3g} +- {NORMAL_95 * error:.2g}")
 
 
 def servos(posterior: FlightPosterior) -> dict[str, ParameterEstimate]:

@@ -76,6 +76,7 @@ def solve_all(
         ),
         instruments=found.instruments,
         tests=_model_tests(state, found.solution, spread, gram, systematic),
+        gusts=found.gusts,
         systematic=systematic,
     )
     off = None if systematic is None else systematic.covariance

@@ -11,11 +11,12 @@ from made_flight import KESTREL, flight
 
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.batch.systematic.flight_posterior import FlightPosterior, flight_posterior
+from sysid_node.batch.systematic.online_passes import online_passes
 
 
 @cache
 def posterior(*seeds: int) -> FlightPosterior:
-    found = flight_posterior(UNCERTAIN, [behind_servos(seed) for seed in seeds], BatchSettings())
+    found = flight_posterior(online_passes(UNCERTAIN, [behind_servos(seed) for seed in seeds], BatchSettings()))
     assert found is not None
     return found
 
@@ -51,12 +52,12 @@ def test_servos_of_several_flights_are_those_of_each():
 
 
 def test_an_exact_aircraft_has_none():
-    assert flight_posterior(KESTREL, [flight(1)], BatchSettings()) is None
+    assert flight_posterior(online_passes(KESTREL, [flight(1)], BatchSettings())) is None
 
 
 def test_a_flight_that_tells_nothing_leaves_the_others_as_they_are():
     short = behind_servos(2).between(0.0, 0.3)
-    found = flight_posterior(UNCERTAIN, [behind_servos(1), short], BatchSettings())
+    found = flight_posterior(online_passes(UNCERTAIN, [behind_servos(1), short], BatchSettings()))
     assert found is not None
     assert found.mean == pytest.approx(posterior(1).mean)
 
@@ -65,7 +66,7 @@ def test_a_flight_that_tells_nothing_leaves_the_others_as_they_are():
 def test_the_time_of_a_step_in_a_slow_logs_commands_is_not_known(intervals, slowest):
     """Truth: a uniform distribution's standard deviation, which no number of flights makes smaller."""
     records = [replace(flight(1), commanded=True, command_interval=interval) for interval in intervals]
-    found = flight_posterior(KESTREL, records, BatchSettings(actuators="commands"))
+    found = flight_posterior(online_passes(KESTREL, records, BatchSettings(actuators="commands")))
     if not slowest:
         assert found is None
         return

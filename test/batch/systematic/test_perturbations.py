@@ -13,6 +13,7 @@ from made_flight import KESTREL, flight
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.batch.systematic.flight_posterior import flight_posterior
+from sysid_node.batch.systematic.online_passes import online_passes
 from sysid_node.batch.systematic.perturbations import perturbed
 from sysid_node.batch.systematic.sensitivities import RegressionResponse
 
@@ -42,7 +43,7 @@ def response_to(key: str, step: float) -> dict[str, float]:
 
 def test_what_the_derivatives_absorb_moves_all_estimators_alike():
     file = replace(KESTREL, stated_tolerances={key: step for key, (step, _) in ABSORBED.items()})
-    posterior = flight_posterior(file, [RECORD], BatchSettings(actuators="positions"))
+    posterior = flight_posterior(online_passes(file, [RECORD], BatchSettings(actuators="positions")))
     assert posterior is not None
     keys = [one.key for one in posterior.imperfections]
     for key, (step, name) in ABSORBED.items():

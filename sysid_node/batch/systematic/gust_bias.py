@@ -1,0 +1,95 @@
+"""Gusts in the standard errors of methods that take the motion of turbulent air for that by the controls.
+
+A gust turns the aircraft and makes a moment that no vane measures: residuals and regressors are correlated, and no
+residual of a least-squares fit shows that (Ljung, "System Identification", 2nd ed. (1999), sect. 13.4). The online
+estimator's instruments are made from the deflections, which gusts do not cause. The difference d of a method's estimate
+from the online estimator's is therefore an estimate of the method's bias, as uncertain as the online estimate is. The
+method's estimate is left as it is, and the bias is added to its variance (O'Donnell & Hibbert, Analyst 130 (2005),
+721-729):
+
+    sigma^2 = sigma_method^2 + g (d^2 + sigma_online^2) ,
+
+g from 0 to 1 being the share of the residual that is not the sensors' noise. Where the online estimate is normal about
+the truth, the 95 % interval then holds it in 95 % of cases at least, whatever d is. In still air g is
+zero, unless the model lacks an effect: what that leaves cannot be told from gusts here, and biases as they do.
+
+All coefficients of one axis have the same regressors, and so the largest g among theirs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from sysid_node.batch.results.batch_fit import BatchFit
+from sysid_node.batch.results.estimate import NORMAL_95, ParameterEstimate
+from sysid_node.batch.systematic.online_passes import OnlineEstimate
+from sysid_node.flight.record import Array
+
+CONTRADICTION = 2.0  # standard errors of both estimates together by which they differ at most
+SAID = 0.1  # share of gusts in a residual from which a remark tells of them
+#: Coefficients with the same regressors, up to the names of controls.
+AXES = (("CL", "CD", "Cm"), ("CY", "Cl", "Cn"))
+
+
+def with_gust_bias(fit: BatchFit, online: Mapping[str, OnlineEstimate], moved: Array) -> BatchFit:
+    """The ``fit``, its intervals widened by the bias of gusts; ``moved`` (P,): what will be added to its estimates."""
+    shares = _shares(online)
+    estimates = {
+        name: _widened(estimate, online[name], shares[name], by) if name in online else estimate
+        for (name, estimate), by in zip(fit.estimates.items(), moved.tolist(), strict=True)
+    }
+    before, after = (np.array([e.standard_error**2 for e in some.values()]) for some in (fit.estimates, estimates))
+    return replace(
+        fit,
+        estimates=estimates,
+        covariance=fit.covariance + np.diag(np.where(np.isfinite(after - before), after - before, 0.0)),
+        remarks=(*fit.remarks, *_remark(fit.method, online)),
+    )
+
+
+def compared(estimate: ParameterEstimate, online: OnlineEstimate | None) -> ParameterEstimate:
+    """The estimate, not valid where a valid one of the online estimator contradicts it.
+
+    Both have the same flights and tolerances.
+    """
+    if online is None or not online.valid or not estimate.valid:
+        return estimate
+    if abs(estimate.value - online.value) <= CONTRADICTION * math.hypot(estimate.standard_error, online.standard_error):
+        return estimate
+    half = NORMAL_95 * online.standard_error
+    return estimate.invalid(f"contradicted: the online estimator finds {online.value:.3g} +- {half:.2g}")
+
+
+def _shares(online: Mapping[str, OnlineEstimate]) -> dict[str, float]:
+    """By derivative the largest share of gusts among the coefficients of its axis."""
+    by_coefficient = {name.partition("_")[0]: one.gusts for name, one in online.items()}
+    of_axis = {c: max(by_coefficient.get(one, 0.0) for one in axis) for axis in AXES for c in axis}
+    return {name: of_axis.get(name.partition("_")[0], one.gusts) for name, one in online.items()}
+
+
+def _widened(estimate: ParameterEstimate, online: OnlineEstimate, share: float, moved: float) -> ParameterEstimate:
+    if share <= 0.0:
+        return estimate
+    judged = compared(replace(estimate, value=estimate.value + moved), online)
+    if judged.valid and not online.valid:
+        judged = judged.invalid(f"by gusts or a model error, and not known to the online estimator: {online.status}")
+    status = replace(estimate, valid=judged.valid, status=judged.status)
+    bias = math.hypot(judged.value - online.value, online.statistical_error)
+    return status.widened(math.sqrt(share) * bias) if math.isfinite(bias) else status
+
+
+def _remark(method: str, online: Mapping[str, OnlineEstimate]) -> tuple[str, ...]:
+    """A sentence for the reader where a lift, side force or moment leaves more than the sensors' noise."""
+    felt = {name.partition("_")[0]: one.gusts for name, one in online.items()}
+    shaken = [c for c in ("CL", "CY", "Cl", "Cm", "Cn") if felt.get(c, 0.0) > SAID]
+    if not shaken:
+        return ()
+    return (
+        f"{', '.join(shaken)} leave more than the sensors' noise: gusts, or an effect that the model lacks. It biases "
+        f"{method}, whose intervals are widened by how far the online estimator differs. In gusts use filter_error, "
+        "or sysid replay",
+    )
