@@ -128,9 +128,7 @@ def test_whatever_an_autopilot_sends_it_goes_on(
     assert rclpy.ok()
 
 
-def test_after_all_that_it_still_passes_on_what_is_sound(
-    standard: tuple[AdapterNode, Any, Any], probe: Probe
-) -> None:
+def test_after_all_that_it_still_passes_on_what_is_sound(standard: tuple[AdapterNode, Any, Any], probe: Probe) -> None:
     node, imu, _ = standard
     heard: list[Imu] = []
     probe.node.create_subscription(Imu, "imu/data", heard.append, 10)

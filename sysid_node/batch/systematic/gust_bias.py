@@ -13,7 +13,8 @@ g from 0 to 1 being the share of the residual that is not the sensors' noise. Wh
 the truth, the 95 % interval then holds it in 95 % of cases at least, whatever d is. In still air g is
 zero, unless the model lacks an effect: what that leaves cannot be told from gusts here, and biases as they do.
 
-All coefficients of one axis have the same regressors, and so the largest g among theirs.
+All coefficients of one axis have the same regressors, and so the largest g among theirs. Only the drag's is its own
+alone: most of what is left of it is not of gusts but of a polar that no derivative describes.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ from sysid_node.flight.record import Array
 
 CONTRADICTION = 2.0  # standard errors of both estimates together by which they differ at most
 SAID = 0.1  # share of gusts in a residual from which a remark tells of them
+#: Coefficients whose remainder a remark tells of, in words.
+FELT = {"CL": "lift", "CY": "side force", "Cl": "rolling moment", "Cm": "pitching moment", "Cn": "yawing moment"}
 #: Coefficients with the same regressors, up to the names of controls.
 AXES = (("CL", "CD", "Cm"), ("CY", "Cl", "Cn"))
 
@@ -47,7 +50,7 @@ def with_gust_bias(fit: BatchFit, online: Mapping[str, OnlineEstimate], moved: A
         fit,
         estimates=estimates,
         covariance=fit.covariance + np.diag(np.where(np.isfinite(after - before), after - before, 0.0)),
-        remarks=(*fit.remarks, *_remark(fit.method, online)),
+        remarks=(*fit.remarks, *_remark(fit, online)),
     )
 
 
@@ -67,29 +70,31 @@ def compared(estimate: ParameterEstimate, online: OnlineEstimate | None) -> Para
 def _shares(online: Mapping[str, OnlineEstimate]) -> dict[str, float]:
     """By derivative the largest share of gusts among the coefficients of its axis."""
     by_coefficient = {name.partition("_")[0]: one.gusts for name, one in online.items()}
-    of_axis = {c: max(by_coefficient.get(one, 0.0) for one in axis) for axis in AXES for c in axis}
-    return {name: of_axis.get(name.partition("_")[0], one.gusts) for name, one in online.items()}
+    telling = {coefficient: share for coefficient, share in by_coefficient.items() if coefficient != "CD"}
+    of_axis = {c: max(telling.get(one, 0.0) for one in axis) for axis in AXES for c in axis}
+    return {name: max(of_axis.get(name.partition("_")[0], 0.0), one.gusts) for name, one in online.items()}
 
 
 def _widened(estimate: ParameterEstimate, online: OnlineEstimate, share: float, moved: float) -> ParameterEstimate:
+    """The estimate with its bias; not valid if that is most of its error, and the online estimator does not know it."""
     if share <= 0.0:
         return estimate
     judged = compared(replace(estimate, value=estimate.value + moved), online)
-    if judged.valid and not online.valid:
+    bias = math.sqrt(share) * math.hypot(judged.value - online.value, online.statistical_error)
+    if judged.valid and not online.valid and not bias <= estimate.standard_error:
         judged = judged.invalid(f"by gusts or a model error, and not known to the online estimator: {online.status}")
     status = replace(estimate, valid=judged.valid, status=judged.status)
-    bias = math.hypot(judged.value - online.value, online.statistical_error)
-    return status.widened(math.sqrt(share) * bias) if math.isfinite(bias) else status
+    return status.widened(bias) if math.isfinite(bias) else status
 
 
-def _remark(method: str, online: Mapping[str, OnlineEstimate]) -> tuple[str, ...]:
+def _remark(fit: BatchFit, online: Mapping[str, OnlineEstimate]) -> tuple[str, ...]:
     """A sentence for the reader where a lift, side force or moment leaves more than the sensors' noise."""
-    felt = {name.partition("_")[0]: one.gusts for name, one in online.items()}
-    shaken = [c for c in ("CL", "CY", "Cl", "Cm", "Cn") if felt.get(c, 0.0) > SAID]
+    felt = {name.partition("_")[0]: online[name].gusts for name in fit.estimates if name in online}
+    shaken = [words for coefficient, words in FELT.items() if felt.get(coefficient, 0.0) > SAID]
     if not shaken:
         return ()
     return (
-        f"{', '.join(shaken)} leave more than the sensors' noise: gusts, or an effect that the model lacks. It biases "
-        f"{method}, whose intervals are widened by how far the online estimator differs. In gusts use filter_error, "
-        "or sysid replay",
+        f"more than the sensors' noise is left of {', '.join(shaken)}: gusts, or an effect that the model lacks. It "
+        f"biases {fit.method}, whose intervals are widened by how far the online estimator differs. In gusts use "
+        "filter_error, or sysid replay",
     )

@@ -80,7 +80,15 @@ def test_gusts_in_one_coefficient_count_for_all_with_its_regressors(fit):
     expected = [np.hypot(e.standard_error, 0.1 * np.sqrt(0.9) * (n in wider)) for n, e in fit.estimates.items()]
     np.testing.assert_allclose([e.standard_error for e in found.estimates.values()], expected)
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), expected)
-    assert found.remarks[-1].startswith("Cm leave more than the sensors' noise: gusts, or an effect")
+    assert found.remarks[-1].startswith("more than the sensors' noise is left of pitching moment: gusts, or an effect")
+
+
+def test_what_is_left_of_the_drag_counts_for_the_drag_alone(fit):
+    online = {n: OnlineEstimate(e.value, 0.1, 0.1, "ok", 0.9 * n.startswith("CD_")) for n, e in fit.estimates.items()}
+    found = with_gust_bias(fit, online, np.zeros(len(fit.estimates)))
+    wider = {name for name, e in found.estimates.items() if e.standard_error > fit.estimates[name].standard_error}
+    assert wider == {name for name in fit.estimates if name.startswith("CD_")}
+    assert found.remarks == fit.remarks
 
 
 def test_what_will_be_added_to_an_estimate_is_no_bias(fit):
@@ -92,6 +100,10 @@ def test_what_will_be_added_to_an_estimate_is_no_bias(fit):
 
 
 def test_what_the_online_estimator_does_not_know_in_gusts_is_not_valid(fit):
+    """Unless the bias is the smaller part of its error."""
+    own = fit.estimates["Cm_de"]
+    small = {"Cm_de": OnlineEstimate(own.value, 1.0, own.standard_error, "collinear with q", 0.5)}
+    assert with_gust_bias(fit, small, np.zeros(len(fit.estimates))).estimates["Cm_de"].valid
     online = {"Cm_de": OnlineEstimate(0.0, 1.0, 1.0, "collinear with q", 0.5)}
     found = with_gust_bias(fit, online, np.zeros(len(fit.estimates))).estimates["Cm_de"]
     assert not found.valid
