@@ -29,7 +29,7 @@ from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
-BAGS = Path(__file__).resolve().parents[3] / "bags"
+BAGS = Path(__file__).resolve().parents[2] / "bags"
 
 WATCHED = ("CL_alpha", "CL_de", "CD_alpha", "Cm_alpha", "Cm_q", "Cm_de", "CY_beta", "Cl_beta", "Cl_p", "Cl_da")
 WATCHED = (*WATCHED, "Cn_beta", "Cn_r", "Cn_dr")

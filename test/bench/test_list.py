@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from bench.batch import comparison
+from bench.estimation import log_rates
+
 ROOT = Path(__file__).resolve().parents[2]
 MODULES = sorted(
     ".".join(path.relative_to(ROOT).with_suffix("").parts)
@@ -37,3 +40,9 @@ def test_what_is_listed_is_there() -> None:
     listed = re.findall(r"^\| `([\w.]+)`", README, re.M)
     assert len(listed) > 30
     assert {f"bench.{name}" for name in listed} <= set(PROGRAMS)
+
+
+def test_bundled_flights_that_benches_read_are_there() -> None:
+    """The bench that compares all methods had looked one folder too high."""
+    assert (comparison.BAGS / "cdrw_multistep").is_dir()
+    assert (log_rates.BAGS / "cdrw_multistep").is_dir()
