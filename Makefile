@@ -45,7 +45,7 @@ docs: $(DONE)/run $(DONE)/desk $(DONE)/docs  ## the documentation as a site, out
 	@echo "out/docs/index.html"
 
 test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev $(DONE)/docs $(DONE)/view  ## run all tests; ARGS="test/online -x" runs some
-	@$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+	@$(BIN)/python -m pytest -n 3 --dist loadfile $(ARGS)
 
 lint: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev  ## ruff and mypy --strict
 	@$(BIN)/ruff check .
