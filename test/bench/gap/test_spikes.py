@@ -213,15 +213,6 @@ def test_tolerances_excuse_what_lies_within_three_of_them_and_no_more() -> None:
 
 
 @pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
-def test_what_explains_nothing_of_parts_not_fitted_is_not_named_beside_what_was_put_in() -> None:
-    """The gyroscopes' scale improves the fit beside the airspeed, but parts that were not fitted are further off."""
-    line = diagnosed(RECORDS, Case(0, "attas", "airspeed_scale", {"error": 0.16}))
-    (cause,) = line["causes"]
-    assert cause["effect"] == "airspeed_scale"
-    assert cause["parameters"]["error"][0] == pytest.approx(0.16, rel=0.2)
-
-
-@pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
 def test_a_file_of_another_mass_is_left_for_derivatives_that_fly_the_record() -> None:
     """By frequency both predict alike; in short flights the file is off by several times the motion.
 
