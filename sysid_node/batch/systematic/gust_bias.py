@@ -82,9 +82,13 @@ def _widened(estimate: ParameterEstimate, online: OnlineEstimate, share: float, 
     judged = compared(replace(estimate, value=estimate.value + moved), online)
     bias = math.sqrt(share) * math.hypot(judged.value - online.value, online.statistical_error)
     if judged.valid and not online.valid and not bias <= estimate.standard_error:
-        judged = judged.invalid(f"by gusts or a model error, and not known to the online estimator: {online.status}")
+        judged = judged.invalid(f"unconfirmed: {online.status}")
     status = replace(estimate, valid=judged.valid, status=judged.status)
     return status.widened(bias) if math.isfinite(bias) else status
+
+
+def _listed(words: list[str]) -> str:
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def _remark(fit: BatchFit, online: Mapping[str, OnlineEstimate]) -> tuple[str, ...]:
@@ -94,7 +98,7 @@ def _remark(fit: BatchFit, online: Mapping[str, OnlineEstimate]) -> tuple[str, .
     if not shaken:
         return ()
     return (
-        f"more than the sensors' noise is left of {', '.join(shaken)}: gusts, or an effect that the model lacks. It "
+        f"more than the sensors' noise is left of {_listed(shaken)}: gusts, or an effect that the model lacks. It "
         f"biases {fit.method}, whose intervals are widened by how far the online estimator differs. In gusts use "
         "filter_error, or sysid replay",
     )

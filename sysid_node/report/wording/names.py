@@ -51,7 +51,9 @@ STATUS_WORDS = {
     "converging": "not settled yet; more flying is needed",
     "stale input": "a sensor sent no data",
     "outside model": "flown where the model does not hold",
+    "contradicted: the online": "contradicted by the online estimator",
     "contradicted": "contradicted by the last seconds of the flight",
+    "unconfirmed": "biased by gusts or a model error, and not known to the online estimator",
     "changed": "changed in flight and being estimated anew",
 }
 

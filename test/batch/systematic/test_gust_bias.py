@@ -107,7 +107,7 @@ def test_what_the_online_estimator_does_not_know_in_gusts_is_not_valid(fit):
     online = {"Cm_de": OnlineEstimate(0.0, 1.0, 1.0, "collinear with q", 0.5)}
     found = with_gust_bias(fit, online, np.zeros(len(fit.estimates))).estimates["Cm_de"]
     assert not found.valid
-    assert found.status == "by gusts or a model error, and not known to the online estimator: collinear with q"
+    assert found.status == "unconfirmed: collinear with q"
 
 
 @pytest.mark.parametrize("method", ["equation_error", "frequency_equation_error", "recursive_least_squares"])
