@@ -48,8 +48,8 @@ _REGRESSIONS: dict[str, Callable[[Aircraft, Sequence[FlightRecord], BatchSetting
 #: Methods that integrate a model.
 _SEARCHES = ("output_error", "filter_error")
 METHODS = (*_REGRESSIONS, *_SEARCHES, *KALMAN_FILTERS)
-#: Methods that gusts do not bias: they estimate the motion of the air.
-_STANDS_GUSTS = frozenset({"filter_error"})
+#: Methods that estimate the motion of the air, so that gusts do not bias them.
+_MODELS_GUSTS = frozenset({"filter_error"})
 
 #: Of regressions that do not weigh all of the signals alike: low-pass (Hz), and the share of its weight that a sample
 #: keeps in a second.
@@ -167,7 +167,7 @@ def _fitted_with_systematic_errors(
     aircraft, records = flights.aircraft, flights.records
     try:
         fit, predict, response = _fitted(method, aircraft, records, settings)
-        fit = _with_other_errors(fit, flights, response, stands_gusts=method in _STANDS_GUSTS)
+        fit = _with_other_errors(fit, flights, response, models_gusts=method in _MODELS_GUSTS)
     except (np.linalg.LinAlgError, ArithmeticError) as error:
         names = ", ".join(record.name for record in records)
         raise InputError(
@@ -178,7 +178,7 @@ def _fitted_with_systematic_errors(
 
 
 def _with_other_errors(
-    fit: BatchFit, flights: _PreparedFlights, response: Callable[[], Response], *, stands_gusts: bool
+    fit: BatchFit, flights: _PreparedFlights, response: Callable[[], Response], *, models_gusts: bool
 ) -> BatchFit:
     """The fit with intervals that hold what gusts do to the method, and what the tolerances leave open."""
     if flights.posterior is not None:
@@ -189,9 +189,9 @@ def _with_other_errors(
             flights.posterior,
             response(),
             flights.online,
-            stands_gusts=stands_gusts,
+            models_gusts=models_gusts,
         )
-    return fit if stands_gusts else with_gust_bias(fit, flights.online, np.zeros(len(fit.estimates)))
+    return fit if models_gusts else with_gust_bias(fit, flights.online, np.zeros(len(fit.estimates)))
 
 
 def refuse_unused(method: str, settings: Mapping[str, object]) -> None:

@@ -125,10 +125,10 @@ def test_whatever_an_autopilot_sends_it_goes_on(
     imu.publish(serialize_message(Imu(header=header))[:-9])
     for _ in range(6):
         rclpy.spin_once(node, timeout_sec=0.002)
-    assert rclpy.ok()
 
 
-def test_after_all_that_it_still_passes_on_what_is_sound(standard: tuple[AdapterNode, Any, Any], probe: Probe) -> None:
+def test_what_is_sound_is_passed_on_afterwards(standard: tuple[AdapterNode, Any, Any], probe: Probe) -> None:
+    """By the node that has had all the messages of the test above."""
     node, imu, _ = standard
     heard: list[Imu] = []
     probe.node.create_subscription(Imu, "imu/data", heard.append, 10)

@@ -9,12 +9,9 @@ method's estimate is left as it is, and the bias is added to its variance (O'Don
 
     sigma^2 = sigma_method^2 + g (d^2 + sigma_online^2) ,
 
-g from 0 to 1 being the share of the residual that is not the sensors' noise. Where the online estimate is normal about
-the truth, the 95 % interval then holds it in 95 % of cases at least, whatever d is. In still air g is
-zero, unless the model lacks an effect: what that leaves cannot be told from gusts here, and biases as they do.
-
-All coefficients of one axis have the same regressors, and so the largest g among theirs. Only the drag's is its own
-alone: most of what is left of it is not of gusts but of a polar that no derivative describes.
+g from 0 to 1 being the share of the residual that is not the sensors' noise. Where g is one and the online estimate is
+normal about the truth, the 95 % interval holds it in 95 % of cases at least, whatever d is. In still air g is zero,
+unless the model lacks an effect: what that leaves cannot be told from gusts here, and it biases in the same way.
 """
 
 from __future__ import annotations
@@ -34,8 +31,10 @@ CONTRADICTION = 2.0  # standard errors of both estimates together by which they 
 SAID = 0.1  # share of gusts in a residual from which a remark tells of them
 #: Coefficients whose remainder a remark tells of, in words.
 FELT = {"CL": "lift", "CY": "side force", "Cl": "rolling moment", "Cm": "pitching moment", "Cn": "yawing moment"}
-#: Coefficients with the same regressors, up to the names of controls.
-AXES = (("CL", "CD", "Cm"), ("CY", "Cl", "Cn"))
+#: By coefficient those whose residuals tell of gusts in its regressors, which are the same for a whole axis. What is
+#: left of the drag counts for the drag alone: most of it is of a polar that no derivative describes.
+TELLING = {"CL": ("CL", "Cm"), "CD": ("CL", "CD", "Cm"), "Cm": ("CL", "Cm")}
+TELLING |= dict.fromkeys(("CY", "Cl", "Cn"), ("CY", "Cl", "Cn"))
 
 
 def with_gust_bias(fit: BatchFit, online: Mapping[str, OnlineEstimate], moved: Array) -> BatchFit:
@@ -54,7 +53,7 @@ def with_gust_bias(fit: BatchFit, online: Mapping[str, OnlineEstimate], moved: A
     )
 
 
-def compared(estimate: ParameterEstimate, online: OnlineEstimate | None) -> ParameterEstimate:
+def unless_contradicted(estimate: ParameterEstimate, online: OnlineEstimate | None) -> ParameterEstimate:
     """The estimate, not valid where a valid one of the online estimator contradicts it.
 
     Both have the same flights and tolerances.
@@ -68,18 +67,17 @@ def compared(estimate: ParameterEstimate, online: OnlineEstimate | None) -> Para
 
 
 def _shares(online: Mapping[str, OnlineEstimate]) -> dict[str, float]:
-    """By derivative the largest share of gusts among the coefficients of its axis."""
-    by_coefficient = {name.partition("_")[0]: one.gusts for name, one in online.items()}
-    telling = {coefficient: share for coefficient, share in by_coefficient.items() if coefficient != "CD"}
-    of_axis = {c: max(telling.get(one, 0.0) for one in axis) for axis in AXES for c in axis}
-    return {name: max(of_axis.get(name.partition("_")[0], 0.0), one.gusts) for name, one in online.items()}
+    """By derivative the largest share of gusts among the coefficients that tell of them."""
+    gusts = {name.partition("_")[0]: one.gusts for name, one in online.items()}
+    largest = {c: max(gusts.get(one, 0.0) for one in TELLING.get(c, (c,))) for c in gusts}
+    return {name: largest[name.partition("_")[0]] for name in online}
 
 
 def _widened(estimate: ParameterEstimate, online: OnlineEstimate, share: float, moved: float) -> ParameterEstimate:
     """The estimate with its bias; not valid if that is most of its error, and the online estimator does not know it."""
     if share <= 0.0:
         return estimate
-    judged = compared(replace(estimate, value=estimate.value + moved), online)
+    judged = unless_contradicted(replace(estimate, value=estimate.value + moved), online)
     bias = math.sqrt(share) * math.hypot(judged.value - online.value, online.statistical_error)
     if judged.valid and not online.valid and not bias <= estimate.standard_error:
         judged = judged.invalid(f"unconfirmed: {online.status}")

@@ -24,7 +24,7 @@ from sysid_node.batch.results.batch_fit import BatchFit, SystematicPart
 from sysid_node.batch.results.estimate import ParameterEstimate, confidence_interval
 from sysid_node.batch.systematic.clocks import LATE_COLUMNS, corrected, is_timing
 from sysid_node.batch.systematic.flight_posterior import FlightPosterior, Imperfection
-from sysid_node.batch.systematic.gust_bias import compared, with_gust_bias
+from sysid_node.batch.systematic.gust_bias import unless_contradicted, with_gust_bias
 from sysid_node.batch.systematic.online_passes import OnlineEstimate
 from sysid_node.batch.systematic.perturbations import perturbed
 from sysid_node.batch.systematic.sensitivities import RegressionResponse, Response
@@ -48,24 +48,24 @@ def with_systematic_errors(
     response: Response,
     online: Mapping[str, OnlineEstimate],
     *,
-    stands_gusts: bool = True,
+    models_gusts: bool,
 ) -> BatchFit:
     """The ``fit`` to the records ``on_time``, moved by all other imperfections, with intervals that hold them all.
 
     ``records`` are those before any correction; ``response`` says how the method's estimates move. Estimates that a
-    valid one of the ``online`` estimator contradicts are not valid. ``stands_gusts``: whether gusts do not bias the
-    method; otherwise its intervals hold that bias, too.
+    valid one of the ``online`` estimator contradicts are not valid. ``models_gusts``: whether the method estimates the
+    motion of the air; otherwise gusts bias it, and its intervals hold that bias, too.
     """
     names = tuple(fit.estimates)
     G = _jacobian(aircraft, records, names, posterior, response)
     others = np.array([not is_timing(one) for one in posterior.imperfections])
     moved = ((posterior.mean - _taken_into_account(aircraft, posterior)) * others) @ G
-    if not stands_gusts:
+    if not models_gusts:
         fit = with_gust_bias(fit, online, moved)
     systematic = G.T @ posterior.covariance @ G
     errors = np.sqrt(np.maximum(np.diag(systematic), 0.0))
     estimates = {
-        name: compared(estimate.with_systematic(float(error), float(by)), online.get(name))
+        name: unless_contradicted(estimate.with_systematic(float(error), float(by)), online.get(name))
         for (name, estimate), error, by in zip(fit.estimates.items(), errors, moved, strict=True)
     }
     keys = tuple(one.key for one in posterior.imperfections)

@@ -110,7 +110,7 @@ def test_what_the_online_estimator_contradicts_is_not_valid(off, valid):
     online = OnlineEstimate(own.value + off * np.hypot(own.standard_error, 0.01), 0.01, 0.01, "ok", 0.0)
     still = replace(posterior, mean=0.0 * posterior.mean, covariance=0.0 * posterior.covariance)
     found = with_systematic_errors(
-        UNCERTAIN, [flight(1)], fit, still, lambda _: np.zeros(len(fit.estimates)), {"Cm_de": online}
+        UNCERTAIN, [flight(1)], fit, still, lambda _: np.zeros(len(fit.estimates)), {"Cm_de": online}, models_gusts=True
     )
     assert found.estimates["Cm_de"].valid == valid
     assert found.estimates["Cm_de"].status.startswith("contradicted") != valid

@@ -50,7 +50,7 @@ def test_a_value_of_a_wrong_type_is_refused_over_a_file(tmp_path: Path, rule: st
 
 @pytest.mark.parametrize("rule", ["adapt:=false", "adapt:=n", "gain:=1e3", "gain:=.5", "other:adapt:=0", "unknown:=0"])
 def test_right_values_pass(tmp_path: Path, rule: str) -> None:
-    """The last value is refused all the same: the one before it was looked at, and passed."""
+    """A wrong value that follows is refused, so the values are looked at."""
     given = arguments(tmp_path, FILE, "-p", rule)
     refuse_mistyped(given, "/uav1/node", TABLE)
     with pytest.raises(InputError, match="parameter method = 1 "):
