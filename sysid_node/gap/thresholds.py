@@ -179,6 +179,12 @@ class Search:
         "1",
         "deviance by which a variant of an effect, or one with an onset, must be better for each parameter more",
     )
+    relief: float = _threshold(
+        3.0,
+        "nat",
+        "nats by which a candidate must make the derivatives more probable, by the file's tolerances, to be fitted for "
+        "that alone",
+    )
     alternatives: int = _threshold(4, "1", "alternatives to a cause that are fitted")
     sweeps: int = _threshold(3, "1", "times that all causes are compared with their alternatives, at most")
     lead: float = _threshold(

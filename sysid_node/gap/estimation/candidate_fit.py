@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import Candidate
-from sysid_node.gap.estimation.nuisances import Nuisances
+from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, Nuisances
 from sysid_node.gap.estimation.spectral_weights import noise_pull, real_rows, residual_power, weights
 from sysid_node.gap.residuals.parameter_priors import bounds, prior
 from sysid_node.gap.residuals.residual_model import ResidualModel
@@ -158,6 +158,19 @@ class CandidateFit:
         centre, sigma = prior(self.simulator, self.indices)
         squares = float(np.sum((now / spread) ** 2) + np.sum(((self.values - centre) / sigma) ** 2))
         return -0.5 * squares - self.log_widening
+
+    @property
+    def derivative_places(self) -> list[int]:
+        """Places of the derivatives among the nuisance parameters that all flights share, which come first."""
+        shared = (i for i, s in zip(self.nuisances.indices, self.nuisances.shared, strict=True) if s)
+        return [k for k, i in enumerate(shared) if self.simulator.names[i].startswith(DERIVATIVE_ERROR)]
+
+    @property
+    def derivative_score(self) -> float:
+        """The derivatives' part of ``prior_score``, nats."""
+        now, spread, _ = self.stacked
+        places = self.derivative_places
+        return -0.5 * float(np.sum((now[places] / spread[places]) ** 2)) - self.log_widening
 
     def noise_pull_on(self, indices: Sequence[int]) -> Array:
         """Pull (unknowns,) that corrects for the noise of the regressors, see ``spectral_weights.noise_pull``.

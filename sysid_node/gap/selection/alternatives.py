@@ -178,12 +178,16 @@ class _Alternative:
         return self.position.fitter.add_candidate(self.position.chosen, added)
 
     @property
-    def adds_up(self) -> bool:
-        base, chosen, both = self.position.base, self.position.chosen, self.both
-        if both is None or not is_accepted(Comparison(base, chosen, both)):
+    def leaves_cause(self) -> bool:
+        if self.both is None:
             return False
-        cause_added = replace(both, added=self.position.measured.candidate)
-        return is_accepted(Comparison(base, self.fitted, cause_added))
+        cause_added = replace(self.both, added=self.position.measured.candidate)
+        return is_accepted(Comparison(self.position.base, self.fitted, cause_added))
+
+    @property
+    def adds_up(self) -> bool:
+        both = self.both
+        return both is not None and is_accepted(Comparison(self.position.base, self.position.chosen, both))
 
     @property
     def enough(self) -> bool:

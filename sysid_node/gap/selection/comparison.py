@@ -14,7 +14,7 @@ import numpy as np
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, with_candidates
 from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, TIME_EFFECTS, travel_of
-from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, stated_biases
+from sysid_node.gap.estimation.nuisances import stated_biases
 from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence, exported_parameters, probabilities
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor
@@ -261,8 +261,7 @@ def derivative_shift(fit: CandidateFit) -> DerivativeShift:
     """
     assert fit.information is not None
     now, spread, _ = fit.stacked
-    shared = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
-    places = [k for k, i in enumerate(shared) if fit.simulator.names[i].startswith(DERIVATIVE_ERROR)]
+    places = fit.derivative_places
     variance = np.diag(fit.covariance)[len(fit.indices) :][places]
     known = np.clip(1.0 - variance / spread[places] ** 2, 0.0, 1.0)
     return DerivativeShift(float(np.sum((now[places] / spread[places]) ** 2)), float(known.sum()), fit.log_widening)

@@ -215,9 +215,15 @@ def _forward(
 
 
 def _is_better(base: FittedSet, best: FittedSet, pair: tuple[FittedSet, FittedSet]) -> bool:
-    """Whether the larger of two explanations is accepted beside the smaller, and in place of the best so far."""
+    """Whether the larger of two explanations is accepted beside the smaller, and in place of the best so far.
+
+    Where it holds the best so far and one candidate more, that one counts, whichever of them was added first.
+    """
     smaller, larger = pair
-    return _takes_the_place(base, best, larger) and (smaller is best or is_accepted(Comparison(base, smaller, larger)))
+    rest = [each for each in larger.fit.candidates if each not in best.fit.candidates]
+    if len(rest) == len(larger.fit.candidates) - len(best.fit.candidates) == 1:
+        return is_accepted(Comparison(base, best, replace(larger, added=rest[0])))
+    return _takes_the_place(base, best, larger) and is_accepted(Comparison(base, smaller, larger))
 
 
 def _takes_the_place(base: FittedSet, best: FittedSet, larger: FittedSet) -> bool:

@@ -39,8 +39,12 @@ class AlternativeScores(Protocol):
         """Parameters that it has fewer than the cause, where both are variants of one effect; else 0."""
 
     @property
+    def leaves_cause(self) -> bool:
+        """Whether the cause is accepted beside the alternative."""
+
+    @property
     def adds_up(self) -> bool:
-        """Whether the cause is accepted beside the alternative, and the alternative beside the cause."""
+        """Whether the alternative is accepted beside the cause as well."""
 
     @property
     def enough(self) -> bool:
@@ -72,6 +76,7 @@ class AlternativeTable:
     lead: float
     fewer: int = 0
     enough: bool = False
+    leaves_cause: bool = False
     adds_up: bool = False
 
 
@@ -109,7 +114,7 @@ def next_step(
     the penalty of its parameters, and in any case where it can have the other's sizes within what these are known to:
     predictions are so precise that a difference of a hundredth, which is the simulator's own error, would decide
     otherwise. An alternative beside which the cause is still needed is none: both stand, or, where there is no room for
-    one more, the cause alone.
+    one more or the alternative is not needed beside the cause, the cause alone.
     """
     room = len(positions) < len(thresholds.search.stages)
 
@@ -131,9 +136,9 @@ def next_step(
     ]
     better = (pair for pair in accepted if lead(pair[0]) > thresholds.search.lead)
     for alternative, step in sorted(better, key=lambda pair: -lead(pair[0])):
-        if not alternative.adds_up:
+        if not alternative.leaves_cause:
             return step
-        if room:
+        if room and alternative.adds_up:
             return replace(step, beside=True)
     return None
 

@@ -31,6 +31,7 @@ class Screened(NamedTuple):
     deviance: float
     candidate: Candidate
     start: tuple[float, ...]
+    relief: float = 0.0  # nats by which the derivatives are more probable with it, by the file's tolerances
 
 
 class ScreenedPair(NamedTuple):
@@ -83,35 +84,50 @@ def _with_derivatives_released(fit: CandidateFit, problem: VariableProjection, f
     One cause that shifts all derivatives, as another mass does, takes nothing away as long as these stay at the limits
     to which they went in its absence.
     """
-    if problem.free.all() or not np.isfinite(found.deviance):
+    if not np.isfinite(found.deviance):
         return found
-    extended = problem.with_candidate(found.candidate)
-    limits = bounds(fit.simulator, (*fit.indices, *found.candidate.indices))
-    values = extended.joint_start(np.concatenate([fit.values, found.start]), *limits)
-    deviance = extended.deviance(values)
-    if not deviance < found.deviance:
-        return found
-    return Screened(deviance, found.candidate, tuple(values[fit.values.size :].tolist()))
+    extended, values = problem.with_candidate(found.candidate), np.concatenate([fit.values, found.start])
+    if not problem.free.all():
+        values = extended.joint_start(values, *bounds(fit.simulator, (*fit.indices, *found.candidate.indices)))
+        deviance = extended.deviance(values)
+        if deviance < found.deviance:
+            found = Screened(deviance, found.candidate, tuple(values[fit.values.size :].tolist()))
+    return found._replace(relief=fit.at(extended.points(values)).derivative_score - fit.derivative_score)
 
 
 def best_screened(pairs: Sequence[ScreenedPair], most: int, thresholds: Thresholds = THRESHOLDS) -> list[ScreenedPair]:
     """Of pairs, the best first, at most so many for each explanation, and a few of each effect.
 
     An effect may act on several controls or coefficients, each of them a candidate; others must have room, too. A
-    second variant of an effect that all controls may share takes no room.
+    second variant of an effect that all controls may share takes no room. The one that makes the derivatives most
+    probable takes none, either: what derivatives made up for, each within its tolerance, leaves little to be removed.
     """
     counts: Counter[tuple[int, str]] = Counter()
     seen: set[tuple[int, str]] = set()
-    kept = []
-    for pair in _likely_variants(pairs, thresholds):
+    kept, likely = [], _likely_variants(pairs, thresholds)
+    relieving = _relieving(likely, thresholds)
+    for pair in likely:
         explanation, candidate = id(pair.explanation), pair.screened.candidate
         law = f"{candidate.effect} {candidate.law}"
-        if counts[explanation, ""] < most and counts[explanation, law] < thresholds.search.per_effect:
+        if pair is relieving.get(explanation):
+            kept.append(pair)
+        elif counts[explanation, ""] < most and counts[explanation, law] < thresholds.search.per_effect:
             again = candidate.effect in SHARED and (explanation, candidate.effect) in seen
             counts.update([(explanation, law), *([] if again else [(explanation, "")])])
             seen.add((explanation, candidate.effect))
             kept.append(pair)
     return kept
+
+
+def _relieving(pairs: Sequence[ScreenedPair], thresholds: Thresholds) -> dict[int, ScreenedPair]:
+    """By explanation the pair that makes the derivatives most probable; none where that is little."""
+    best: dict[int, ScreenedPair] = {}
+    for pair in pairs:
+        known = best.get(id(pair.explanation))
+        least = thresholds.search.relief if known is None else known.screened.relief
+        if pair.screened.relief > least:
+            best[id(pair.explanation)] = pair
+    return best
 
 
 def _likely_variants(pairs: Sequence[ScreenedPair], thresholds: Thresholds) -> list[ScreenedPair]:

@@ -21,7 +21,7 @@ def test_screening_ranks_the_true_effect_first_and_says_how_far_it_got(late) -> 
         base, list(candidates.values()), lambda share, text: shares.append(share)
     )
     assert screened[0][1].label == "command_delay"
-    assert [deviance for deviance, _, _ in screened] == sorted(deviance for deviance, _, _ in screened)
+    assert [each.deviance for each in screened] == sorted(each.deviance for each in screened)
     assert shares == sorted(shares) and shares[-1] == pytest.approx(0.5)
 
 
@@ -73,5 +73,5 @@ def test_a_start_that_is_not_finite_is_no_explanation(late) -> None:
 def test_screening_leaves_infinitely_much_where_no_numbers_come(late) -> None:
     fitter, base, candidates = late
     endless = replace(candidates["command_delay"], starts=((np.nan,),))
-    ((deviance, candidate, _),) = CandidateFitter(fitter.nuisances, Checkpoint()).screen(base, [endless], silent)
-    assert deviance == np.inf and candidate is endless
+    (found,) = CandidateFitter(fitter.nuisances, Checkpoint()).screen(base, [endless], silent)
+    assert found.deviance == np.inf and found.candidate is endless

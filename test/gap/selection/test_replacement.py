@@ -85,11 +85,18 @@ def test_an_alternative_that_is_not_accepted_takes_no_place() -> None:
 
 def test_effects_that_add_up_stand_beside_each_other() -> None:
     """Up to the three causes that an explanation may have; where it has them, the next alternative is asked."""
-    both = replace(alternative("cg_shift", 7.0), adds_up=True)
+    both = replace(alternative("cg_shift", 7.0), leaves_cause=True, adds_up=True)
     positions = [cause(both, alternative("mass_error", 5.0)), cause()]
     assert next_step(positions) == Step(0, 0, beside=True)
     assert next_step([*positions, cause()]) == Step(0, 1)
     assert next_step([cause(both), cause(), cause()]) is None
+
+
+def test_an_alternative_beside_which_the_cause_is_needed_takes_no_place() -> None:
+    """It is not needed beside the cause, so the cause stands alone."""
+    beside = replace(alternative("vane_lever_arm", 7.0), leaves_cause=True)
+    assert next_step([cause(beside)]) is None
+    assert next_step([cause(beside, alternative("cg_shift", 5.0))]) == Step(0, 1)
 
 
 def test_a_larger_lead_may_be_asked_for() -> None:
