@@ -249,6 +249,12 @@ class Validation:
     large_improvement: float = _threshold(
         0.7, "1", "ratio of the error with causes to the file's, by one measure, from which a tie by another is no veto"
     )
+    mean_improvement: float = _threshold(
+        0.8,
+        "1",
+        "geometric mean over channels of the ratio of the error with causes to that of derivatives within their "
+        "tolerances, by one measure, below which causes predict better whatever the worst channel does",
+    )
     product: float = _threshold(
         0.5, "1", "ratio of the product of two measures' errors to the file's below which one may be worse than a tie"
     )

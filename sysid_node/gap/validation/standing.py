@@ -64,7 +64,7 @@ def causes_stand(
 ) -> bool:
     """Whether causes predict better than the derivatives by at least one measure, and than the file by every one.
 
-    They also do where they take away a large share of the error by the geometric mean over channels. Where they take a
+    They also do where they take away a fifth of the error by the geometric mean over channels. Where they take a
     large share of the file's away by one measure, they may tie with the file by another: one that does not see what
     they change. In gusts that is often the whole of either; ``attitude`` are the errors of the
     attitude by the gyroscopes, in which no gusts are. Where they take away much of the error of short flights, they may
@@ -76,10 +76,8 @@ def causes_stand(
     most = 1.0 if excused else thresholds.validation.unexcused
     limits = thresholds.validation
     seen = (*errors, *attitude)
-    over_file, over_tolerances = (
-        any(channel_ratio(e, e, stage, thresholds) < limits.large_improvement for e in errors)
-        for stage in ("before", "tolerances")
-    )
+    over_file = any(channel_ratio(e, e, "before", thresholds) < limits.large_improvement for e in errors)
+    over_tolerances = any(channel_ratio(e, e, "tolerances", thresholds) < limits.mean_improvement for e in errors)
     large = over_file or any(e.after < limits.large_improvement * e.before for e in seen)
     worst = _worst(errors[-1].after, errors[-1].before, thresholds, otherwise=limits.tie if large else 1.0)
     better = over_tolerances or any(e.after < most * e.tolerances for e in seen)

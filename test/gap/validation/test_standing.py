@@ -145,6 +145,9 @@ def test_what_mends_most_channels_is_not_missed_beside_one_that_nothing_mends() 
     flown = by_channel(0.591, 0.465, 0.435, p=(0.53, 0.32, 0.107), r=(0.8, 0.56, 0.61), ay=(0.57, 0.4, 0.48))
     assert causes_stand([by_frequency, flown])
     assert not causes_stand([each._replace(per_channel={}) for each in (by_frequency, flown)])
+    shorter = by_channel(0.482, 0.355, 0.379, Cl=(0.75, 0.39, 0.12), CY=(0.22, 0.16, 0.19), Cn=(0.89, 0.76, 0.9))
+    flown = by_channel(0.574, 0.457, 0.473, p=(0.46, 0.27, 0.15), r=(0.79, 0.67, 0.68), ay=(0.57, 0.49, 0.54))
+    assert causes_stand([shorter, flown])  # the same lag of 0.05 s: the geometric mean of its errors is 0.76 of theirs
     yaw_alone = by_channel(0.516, 0.337, 0.337, Cl=(0.867, 0.47, 0.477), CY=(0.22, 0.15, 0.15), beta=(0.63, 0.44, 0.44),
                            Cn=(0.891, 0.66, 0.66), phi=(0.33, 0.22, 0.22))  # fmt: skip
     assert not is_needless([by_frequency], [yaw_alone])
