@@ -43,7 +43,8 @@ def judge(
 ) -> Judged:
     """A case by its line of the ledger; ``unspiked`` is the gap of the record as it is, on its line.
 
-    ``own`` are sizes of effects that the record itself holds: what is put in adds to them.
+    ``own`` are sizes of effects that the record itself holds, of one control under "effect.control": what is put in
+    adds to them.
     """
     effect, values = row["effect"], row["values"]
     stated = tuple((c["probability"], _there(c, effect, holds)) for c in row["causes"])
@@ -53,9 +54,10 @@ def judge(
     others = [c for c in row["causes"] if not _among(c, holds) or _among(c, (effect,))]
     named = bool(others) and _among(others[0], (effect,))
     found = next((c for c in row["causes"] if c["effect"] == effect), None)
-    more = own.get(effect, 0.0)
     sized = (
-        all(_sized(found["parameters"], n, v + more) for n, v in _sizes(effect, values)) if named and found else None
+        all(_sized(found["parameters"], n, v, effect, own) for n, v in _sizes(effect, values))
+        if named and found
+        else None
     )
     closed = None if unspiked is None or row["gap"] is None else _is_back(row["gap"], unspiked)
     return Judged(named, sized, closed, wrong, stated)
@@ -89,22 +91,28 @@ def _sizes(effect: str, values: Mapping[str, float]) -> list[tuple[str, float]]:
     return [] if effect == "stuck_surface" else [(n, v) for n, v in values.items() if n not in _SHAPES]
 
 
-def _sized(found: Mapping[str, Sequence[float]], name: str, true: float) -> bool:
+def _sized(
+    found: Mapping[str, Sequence[float]], name: str, put_in: float, effect: str, own: Mapping[str, float]
+) -> bool:
     """Whether a parameter's size is right; what acts on controls is stated for each of them, named after it."""
-    stated = [found[name]] if name in found else _by_control(found)
-    return bool(stated) and all(_close(each, true) for each in stated)
+    stated = {name: found[name]} if name in found else _by_control(found)
+    true = put_in + own.get(effect, 0.0)
+    return bool(stated) and all(_close(each, true + own.get(f"{effect}.{of}", 0.0)) for of, each in stated.items())
 
 
-def _by_control(found: Mapping[str, Sequence[float]]) -> list[Sequence[float]]:
+def _by_control(found: Mapping[str, Sequence[float]]) -> dict[str, Sequence[float]]:
     """The size of each control; of a lag of second order the time 2 zeta T by which the control comes late.
 
     A lag that is put in before the record's own makes one of second order, whose lateness is the sum of both.
     """
     if "damping" not in found:
-        return list(found.values())
+        return dict(found)
     damping, spread = found["damping"]
-    controls = [each for name, each in found.items() if name != "damping"]
-    return [(2.0 * damping * time, 2.0 * math.hypot(damping * error, spread * time)) for time, error in controls]
+    controls = {name: each for name, each in found.items() if name != "damping"}
+    return {
+        of: (2.0 * damping * time, 2.0 * math.hypot(damping * error, spread * time))
+        for of, (time, error) in controls.items()
+    }
 
 
 def _close(found: Sequence[float], true: float) -> bool:

@@ -55,7 +55,7 @@ class Flight:
 
     ``learned`` are the parts from which the belief's derivatives are; ``late`` and ``lag`` are by how much (s) the
     surfaces follow there what was recorded, and ``air_late`` how late (s) the air data are. ``holds`` are effects that
-    the record has beside its derivatives, ``own`` their sizes where they are known, and ``why`` says why. ``cancelled``
+    the record has beside its derivatives, ``own`` their sizes where they are known (``judging``), and ``why`` says why. ``cancelled``
     are effects that undo what the record holds.
     """
 
@@ -100,6 +100,9 @@ def _cessna(
 #: How late the air data of the HFB-320 and of the Twin Otter are, s.
 _HFB_AIR, _TWIN_OTTER_AIR = 0.22, 0.025
 
+#: By how much (s) what the surfaces of ATTAS do follows what was recorded of them. The rudder's readings are late.
+_ATTAS_LATE = {"aileron": 0.011, "rudder": -0.019}
+
 _DE, _DA, _DR, _DADR = _CESSNA
 _ATTAS = (("attas_lateral_1.csv", 0.0, 30.0), ("attas_lateral_1.csv", 30.04, 60.04))
 
@@ -120,9 +123,15 @@ FLIGHTS: Mapping[str, Flight] = {
                          holds=("air_data_delay", "vane_lever_arm"), own={"air_data_delay": _TWIN_OTTER_AIR},
                          why="its angle of attack follows the integrated rates and forces best 0.025 s late, with a "
                              "third of the error; a vane 1.7 m ahead would do nearly as well"),
-    "attas": Flight("attas", _ATTAS, (), _ATTAS, moved=("aileron", "rudder"), holds=("imu_bias", "imu_scale"),
+    "attas": Flight("attas", _ATTAS, (), _ATTAS, moved=("aileron", "rudder"),
+                    holds=("imu_bias", "imu_scale", "command_delay"),
+                    own={"actuator_stamp_delay": -_ATTAS_LATE["rudder"],
+                         **{f"{effect}.{control}": late for effect in ("command_delay", "actuator_lag")
+                            for control, late in _ATTAS_LATE.items()}},
                     why="in both manoeuvres the gyroscopes drift against the attitude by 0.0035 rad/s in pitch, 0.001 "
-                        "in roll and 0.0009 in yaw, and read 3 % (roll) and 4 % (yaw) more than it turns"),
+                        "in roll and 0.0009 in yaw, and read 3 % (roll) and 4 % (yaw) more than it turns; the rolling "
+                        "moment follows the aileron as recorded best 0.011 s late, the yawing moment the rudder 0.019 "
+                        "s early"),
     "thor": Flight("thor", (("thor_75a.csv", 5.0, 45.0),), (("thor_75a.csv", 55.0, 95.0),),
                    (("thor_75a.csv", 0.0, 100.0),), _SMALL_BIAS, late=0.06, regressors={"CL": ("0", "alpha")},
                    moved=("elevator", "aileron"), holds=("command_delay", "actuator_lag"),

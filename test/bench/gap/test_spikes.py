@@ -17,7 +17,7 @@ from bench.spikes.drawing import SETS, Case, draw
 from bench.spikes.editing import EFFECTS, edited, misbelieved
 from bench.spikes.excusing import INEXCUSABLE, ratio_left
 from bench.spikes.judging import judge
-from bench.spikes.records import FLIGHTS, belief, part, rate_of
+from bench.spikes.records import FLIGHTS, belief, part, rate_of, regression
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.dynamics.airflow import flow_angles, velocity_of
 from sysid_node.dynamics.lever_arm import specific_force_from, velocity_from
@@ -195,6 +195,33 @@ def test_the_flow_angle_is_as_late_as_is_said_against_the_integrated_rates_and_f
     delays = np.linspace(-0.1, 0.4, 101)
     left = [np.std((seen - sosfiltfilt(high, np.interp(time - d, time, angle)))[inner]) for d in delays]
     assert delays[np.argmin(left)] == pytest.approx(FLIGHTS[name].air_late, abs=0.03)
+
+
+@pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
+@pytest.mark.parametrize(("part_of", "surface", "coefficient"), [(0, "da", 3), (1, "dr", 5)])
+def test_each_surface_of_the_lateral_record_follows_as_late_as_is_said(
+    part_of: int, surface: str, coefficient: int
+) -> None:
+    """Truth: of all times by which the readings of a surface are shifted, the one that leaves least of its moment.
+
+    Each surface is shifted in the manoeuvre that is flown with it. The range holds two standard errors.
+    """
+    flight = FLIGHTS["attas"]
+    aircraft, record = belief(RECORDS, flight), part(RECORDS, flight, flight.fitted[part_of])
+    found, columns = regression(aircraft, flight, record)
+    moment, delays = found[:, coefficient], np.linspace(-0.06, 0.06, 49)
+    matrix = np.column_stack([np.ones(moment.size), *(columns[n] for n in ("beta", "p", "r", "da", "dr"))])
+    place, time = 4 if surface == "da" else 5, np.arange(moment.size) / rate_of(record)
+
+    def left(delay: float) -> float:
+        shifted = matrix.copy()
+        shifted[:, place] = np.interp(time - delay, time, columns[surface])
+        error = (moment - shifted @ np.linalg.lstsq(shifted, moment)[0])[5:-5]
+        return float(error @ error)
+
+    control = {"da": "aileron", "dr": "rudder"}[surface]
+    late, room = flight.own[f"command_delay.{control}"], {"da": 0.004, "dr": 0.012}[surface]
+    assert delays[np.argmin([left(d) for d in delays])] == pytest.approx(late, abs=room)
 
 
 @pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
