@@ -55,8 +55,8 @@ class Flight:
 
     ``learned`` are the parts from which the belief's derivatives are; ``late`` and ``lag`` are by how much (s) the
     surfaces follow there what was recorded, and ``air_late`` how late (s) the air data are. ``holds`` are effects that
-    the record has beside its derivatives, ``own`` their sizes where they are known (``judging``), and ``why`` says why. ``cancelled``
-    are effects that undo what the record holds.
+    the record has beside its derivatives, ``own`` their sizes where they are known (``judging.judge``), and ``why``
+    says why. ``cancelled`` are effects that undo what the record holds.
     """
 
     aircraft: str

@@ -38,7 +38,7 @@ def cause_values(found: Diagnosis) -> dict[str, dict[str, UncertainValue]]:
     for cause in found.attribution.causes:
         if cause.candidate.effect == "derivative_error":
             continue
-        sizes = parameters(found.attribution.size_fit, cause)
+        sizes = parameters(found.attribution.size_fit, cause, found.attribution.causes)
         stated = stated_by(cause.candidate, fit.simulator, cause.candidate.entries)
         of_effect = values.setdefault(cause.candidate.effect, {})
         for name, (_, error) in sizes.items():

@@ -14,7 +14,7 @@ from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.excited_axes import quiet_motions
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
 from sysid_node.gap.selection.calibration import calibrated_probability
-from sysid_node.gap.selection.causes import Cause
+from sysid_node.gap.selection.causes import Cause, variance_by_alternatives
 from sysid_node.gap.short_flights.readings import length_of
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.gap.validation.standard_errors import standard_errors, with_standard_error
@@ -114,7 +114,7 @@ def _cause(found: Diagnosis, cause: Cause) -> dict[str, Any]:
         "effect": cause.candidate.effect,
         "label": cause.candidate.label,
         "station": cause.candidate.station,
-        "parameters": parameters(found.attribution.size_fit, cause),
+        "parameters": parameters(found.attribution.size_fit, cause, found.attribution.causes),
         **_known(found, cause),
         "probability": cause.probability,
         "gap_after": found.size.after,
@@ -153,11 +153,12 @@ def _grounds(cause: Cause) -> dict[str, Any]:
     }
 
 
-def parameters(fit: CandidateFit, cause: Cause) -> dict[str, list[float]]:
+def parameters(fit: CandidateFit, cause: Cause, causes: Sequence[Cause] = ()) -> dict[str, list[float]]:
     """Value and standard error of each of a cause's parameters by name, in the units of the aircraft file's effects.
 
-    ``fit`` holds the cause. A cause that only widens the tolerances of derivatives has these as its parameters. What
-    acts on controls has a parameter for each control on which the cause acts.
+    ``fit`` holds the cause, and ``causes`` are all that it is stated beside. A cause that only widens the tolerances of
+    derivatives has these as its parameters. What acts on controls has a parameter for each control on which the cause
+    acts.
     """
     places = {index: place for place, index in enumerate(fit.indices)}
     entries = cause.candidate.indices
@@ -167,11 +168,12 @@ def parameters(fit: CandidateFit, cause: Cause) -> dict[str, list[float]]:
         places = {index: len(fit.indices) + place for place, index in enumerate(ordered)}
         entries = tuple(i for i in ordered if i in cause.candidate.widened)
     errors, point = standard_errors(fit), fit.flights[0].point
+    otherwise = np.sqrt(variance_by_alternatives(cause, causes))
     found = {}
     for name, parameter in stated_by(cause.candidate, fit.simulator, entries).items():
         (moved,) = set(parameter.entries) & set(entries)
         total = float(point[list(parameter.entries)].sum())
-        value, error = with_standard_error(name, total, float(errors[places[moved]]))
+        value, error = with_standard_error(name, total, float(np.hypot(errors[places[moved]], otherwise[moved])))
         if not parameter.inverse:
             found[name] = [value, error]
         elif value > 0.0:  # of 1 / x

@@ -79,6 +79,24 @@ class Cause:
         return CauseTable(self.candidate.label, self.share, largest, self.probability_of_any, by_support)
 
 
+def variance_by_alternatives(cause: Cause, causes: Sequence[Cause]) -> Array:
+    """Variance (P,) of where the parameters stand, because one of the other ``causes`` may be another effect.
+
+    A size depends on what else is blamed: late commands beside late air data move these by as much as a late IMU does.
+    So the explanations with the alternatives to the other causes count by their shares (Hoeting, Madigan, Raftery &
+    Volinsky (1999), Statistical Science 14(4), eq. 3, about what is stated).
+    """
+    variance = np.zeros_like(cause.fit.flights[0].point)
+    for other in causes:
+        for effect, share in other.alternatives if other is not cause else ():
+            fitted = [each for each in other.alternative_sets if each.added and each.added.effect == effect]
+            if fitted:
+                likeliest = max(fitted, key=lambda each: each.evidence.total)
+                moved = likeliest.fit.flights[0].point - other.fit.flights[0].point
+                variance += share * moved**2
+    return variance
+
+
 #: An explanation, its causes, and the doubted ones.
 Selection = tuple[FittedSet, tuple[Cause, ...], tuple[Cause, ...]]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sysid_node.gap.selection.calibration import calibrated_probability
-from sysid_node.gap.selection.causes import select_causes
+from sysid_node.gap.selection.causes import select_causes, variance_by_alternatives
 from sysid_node.gap.selection.comparison import power_left
 from sysid_node.gap.selection.retention import Challenge, next_challenge
 
@@ -50,6 +50,19 @@ def test_a_size_that_is_not_plausible_in_the_whole_explanation_is_no_cause(selec
     absurd = replace(cause, plausible=False)
     assert absurd.probability == absurd.table.probability == 0.0
     assert next_challenge([absurd.table]) == Challenge(0, improbable=True)
+
+
+def test_a_size_is_uncertain_by_what_else_may_be_to_blame(selected, late) -> None:
+    """Truth: a quarter of the square by which every parameter stands elsewhere with the alternative."""
+    fitter, base, candidates = late
+    _, (cause,), _ = selected
+    lag = fitter.add_candidate(base, candidates["actuator_lag"])
+    other = replace(cause, fit=lag.fit, alternatives=(("command_delay", 0.25),),
+                    alternative_sets=(replace(lag, added=candidates["command_delay"], fit=cause.fit),))  # fmt: skip
+    moved = cause.fit.flights[0].point - lag.fit.flights[0].point
+    assert moved.any()
+    np.testing.assert_allclose(variance_by_alternatives(cause, [cause, other]), 0.25 * moved**2)
+    assert not variance_by_alternatives(cause, [cause]).any()
 
 
 def test_its_table_holds_what_decides(selected) -> None:
