@@ -91,7 +91,7 @@ def _model(
     aircraft: Aircraft, settings: OnlineSettings, omega: Array, commanded: bool, command_interval: float
 ) -> EstimatorModel:
     """What does not change in flight; ``omega`` are the lines (rad/s). Raises InputError, see ``init``."""
-    layout = regression_signals.layout(aircraft, INSTRUMENTED if settings.method == "iv_rft" else ())
+    layout = regression_signals.layout(aircraft, INSTRUMENTED)
     unformed = regression_signals.unformed(aircraft)
     structure = {c: rs for c, rs in aircraft.model_structure.items() if c not in unformed and set(rs) - {"0"}}
     if not structure:
@@ -99,12 +99,15 @@ def _model(
     memory = settings.forgetting_time or math.inf
     # lines are independent over one period of their spacing; windows and forgetting want several segments
     segment_time = min(1.0 / settings.frequencies[1], settings.window / 5.0 or math.inf, 2.0 * memory)
-    equations = normal_equations.normal_equations(structure, layout)
+    instrumented = normal_equations.normal_equations(structure, layout)
+    plain = settings.method == "sls_rft"
+    equations = normal_equations.least_squares_of(instrumented) if plain else instrumented
     return EstimatorModel(
         aircraft=aircraft,
         settings=settings,
         layout=layout,
         equations=equations,
+        instrumented=instrumented,
         table=derivative_index(aircraft, equations.structure, settings.valid_fraction),
         vocabulary=vocabulary(aircraft, equations.structure),
         spectrum=information.spectrum(omega, memory),

@@ -70,13 +70,14 @@ class EstimatorModel:
     settings: OnlineSettings
     layout: SignalLayout
     equations: NormalEquations
+    instrumented: NormalEquations  # with instruments, whatever the method
     table: DerivativeIndex
     vocabulary: Vocabulary
     spectrum: Spectrum
     sample: SampleModel
     times: SegmentTimes
     prior: tuple[Array, Array]  # (P, C) the aircraft file's derivatives, and 1 / tolerance^2
-    instrument_model: InstrumentModel | None  # None where the method is least squares
+    instrument_model: InstrumentModel | None  # None where no regressor has an instrument
     imperfections: Imperfections | None  # None where the aircraft file states that all is exact
 
 

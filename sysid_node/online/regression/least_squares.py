@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 
 from sysid_node.online.regression import heteroskedasticity
 from sysid_node.online.regression.information import BANDS, Information
-from sysid_node.online.regression.normal_equations import Index, NormalEquations, with_least_squares_in
+from sysid_node.online.regression.normal_equations import Index, NormalEquations, least_squares_of
 
 Array = NDArray[np.float64]
 
@@ -158,7 +158,7 @@ def instrument_strength(equations: NormalEquations, solution: Solution, info: In
         return InstrumentStrength(np.zeros(P), np.ones(P))
     gram = info.grams.sum(axis=0)
     outer = gram[equations.instruments[:, None], equations.instruments] * structure.same_block
-    plain = solve(with_least_squares_in(equations, tuple(range(int(structure.group.max()) + 1))), gram)
+    plain = solve(least_squares_of(equations), gram)
     if not plain.usable:
         return InstrumentStrength(np.zeros(P), np.ones(P))
     achieved = np.maximum((solution.inverse @ outer @ solution.inverse.T).diagonal(), TINY)

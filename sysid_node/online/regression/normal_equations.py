@@ -129,6 +129,11 @@ def with_strong_instruments(full: NormalEquations, strength: Array) -> NormalEqu
     return with_least_squares_in(full, tuple(sorted(set(weak)))) if weak else full
 
 
+def least_squares_of(full: NormalEquations) -> NormalEquations:
+    """The equations of least squares: every regressor is its own instrument."""
+    return with_least_squares_in(full, tuple(range(int(full.structure.group.max()) + 1)))
+
+
 def with_least_squares_in(full: NormalEquations, blocks: tuple[int, ...]) -> NormalEquations:
     """The equations, with least squares in these blocks; made once and kept in ``variants``."""
     if blocks not in full.variants:

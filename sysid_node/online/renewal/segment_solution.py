@@ -56,7 +56,7 @@ def solve_all(
     gram = total.grams.sum(axis=0)
     found = solved_equations(state, total, gram)
     spread, now = found.spread, state.transform.last
-    before = corrected = _reference(state, found, found.solution, spread)
+    before = corrected = _reference(state, found, found.solution, found.statistical)
     if signals is not None:
         before = _with_recorded_signals(state, recorded, found)
         yield

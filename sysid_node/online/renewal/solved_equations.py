@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +33,8 @@ class SolvedEquations(NamedTuple):
     solution: Solution
     compensation: Array | None  # noise's part of the normal equations
     noise: Array | None  # (W, W) of which that was made, per line and second
-    spread: Uncertainty
+    statistical: Uncertainty  # of later flight: the bias that gusts leave is the same there
+    spread: Uncertainty  # with that bias
     inflation: Array  # (C,) factors of the variances by gusts
     gusts: Array  # (C,) share of the residuals that is not the sensors' noise
     sensed: Array  # (C,) density of the sensors' noise in the residuals
@@ -49,10 +51,14 @@ def solved_equations(state: EstimatorState, total: Information, gram: Array) -> 
         spread.covariance = noise_alone + _reconstruction_covariance(state, solution, total)
     sensed = _sensed(state, total, equations, solution)
     gusts = gust_correlation.share_of_gusts(spread.density, sensed)
+    statistical = spread
+    if equations.least_squares and gusts.any():
+        bias = _gust_bias(state, total, gram, solution, gusts)
+        spread = replace(spread, covariance=spread.covariance + bias)
     checks = _instrument_checks(state, total, gram, strength, solution, spread, noise_alone, gusts)
     answered = gust_correlation.of_solution(equations, solution, gram, gusts)
     inflation = gust_correlation.inflation(spread, gusts, answered)
-    return SolvedEquations(solution, compensation, noise, spread, inflation, gusts, sensed, checks)
+    return SolvedEquations(solution, compensation, noise, statistical, spread, inflation, gusts, sensed, checks)
 
 
 def _solve(
@@ -95,6 +101,21 @@ def _instrument_checks(
         selection_bias_factors(equations, solution, spread, strength, gram, *state.model.prior),
         weak_instruments.anderson_rubin_bounds(equations, table, solution, gram, spread, noise_alone, mean, gusts),
     )
+
+
+def _gust_bias(state: EstimatorState, total: Information, gram: Array, solution: Solution, gusts: Array) -> Array:
+    """(C, P, P) allowance for the bias that gusts leave in least squares: its difference from what instruments find.
+
+    Regressors that are their own instruments hold the gusts that are in the residual. Instruments do not (Hausman
+    (1978), Econometrica 46(6)). The difference d tells of the bias as far as the instruments' estimate is known, so
+    that d d' and its covariance are added, as far as the residual is of gusts: ``gusts`` (C,), none in still air.
+    """
+    full = state.model.instrumented
+    unbiased = least_squares.solve(full, gram)
+    known = least_squares.uncertainty(full, unbiased, total).covariance
+    factor = np.sqrt(least_squares.instrument_strength(full, unbiased, total).selection_factor)
+    off = (solution.theta - unbiased.theta).T
+    return np.asarray(gusts[:, None, None] * (off[:, :, None] * off[:, None, :] + known * np.outer(factor, factor)))
 
 
 def _reconstruction_covariance(state: EstimatorState, solution: Solution, total: Information) -> Array:
