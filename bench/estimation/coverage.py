@@ -38,6 +38,7 @@ SETTINGS = (
 HARD = (
     Setting("white noise"),
     Setting("white noise, vanes 3 x as noisy", vane_noise=3.0),
+    Setting("light turbulence", "light"),
     Setting("moderate turbulence", "moderate"),
     Setting("moderate, vanes 3 x as noisy", "moderate", vane_noise=3.0),
 )

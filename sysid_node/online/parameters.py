@@ -75,7 +75,7 @@ PARAMETERS = (
         _ESTIMATOR.method,
         "",
         "sls_rft: least squares. iv_rft: instrumental variables, unbiased by noise on the flow angles, less precise.",
-        "iv_rft where vanes are noisy beside the motion or the air is turbulent; sls_rft where neither is.",
+        "iv_rft where vanes are noisy beside the motion or the air is turbulent, in which sls_rft has wide intervals.",
         choices=METHODS,
     ),
     NodeParameter(

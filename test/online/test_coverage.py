@@ -19,14 +19,21 @@ TRUTH = [d.value for d in load_aircraft("cdrw").derivatives.values()]
 FLIGHTS = range(1, 17)
 
 
-@pytest.mark.parametrize("turbulence", ["none", "light"])
-def test_intervals_hold_the_truth(turbulence):
+@pytest.mark.parametrize(
+    ("turbulence", "method", "valid", "hold"),
+    [
+        ("none", "iv_rft", 0.9, (0.88, 0.99)),
+        ("light", "iv_rft", 0.9, (0.88, 0.99)),
+        ("light", "sls_rft", 0.8, (0.93, 1.0)),  # without the allowance for the bias by gusts 73 % hold
+    ],
+)
+def test_intervals_hold_the_truth(turbulence, method, valid, hold):
     """16 flights of 27 derivatives: the estimates of a flight depend on one another, so the bounds are wide."""
     setting = Setting("test", turbulence, seconds=15.0)
-    found = estimates("cdrw", setting, [METHODS["iv_rft"]], np.array([14.9]), FLIGHTS)[0, :, 0]
+    found = estimates("cdrw", setting, [METHODS[method]], np.array([14.9]), FLIGHTS)[0, :, 0]
     verdicts = [judge(found[:, d], truth) for d, truth in enumerate(TRUTH)]
-    assert np.mean([v.share_valid for v in verdicts]) > 0.9
-    assert 0.88 < np.nanmean([v.coverage for v in verdicts]) < 0.99
+    assert np.mean([v.share_valid for v in verdicts]) > valid
+    assert hold[0] < np.nanmean([v.coverage for v in verdicts]) <= hold[1]
     assert sum(v.far for v in verdicts) <= 0.005 * sum(v.valid for v in verdicts)
 
 
