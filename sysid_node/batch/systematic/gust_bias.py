@@ -26,15 +26,12 @@ from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.results.estimate import NORMAL_95, ParameterEstimate
 from sysid_node.batch.systematic.online_passes import OnlineEstimate
 from sysid_node.flight.record import Array
+from sysid_node.online.regression.gust_correlation import share_by_axis
 
 CONTRADICTION = 2.0  # standard errors of both estimates together by which they differ at most
 SAID = 0.1  # share of gusts in a residual from which a remark tells of them
 #: Coefficients whose remainder a remark tells of, in words.
 FELT = {"CL": "lift", "CY": "side force", "Cl": "rolling moment", "Cm": "pitching moment", "Cn": "yawing moment"}
-#: By coefficient those whose residuals tell of gusts in its regressors, which are the same for a whole axis. What is
-#: left of the drag counts for the drag alone: most of it is of a polar that no derivative describes.
-TELLING = {"CL": ("CL", "Cm"), "CD": ("CL", "CD", "Cm"), "Cm": ("CL", "Cm")}
-TELLING |= dict.fromkeys(("CY", "Cl", "Cn"), ("CY", "Cl", "Cn"))
 
 
 def with_gust_bias(fit: BatchFit, online: Mapping[str, OnlineEstimate], moved: Array) -> BatchFit:
@@ -69,7 +66,7 @@ def unless_contradicted(estimate: ParameterEstimate, online: OnlineEstimate | No
 def _shares(online: Mapping[str, OnlineEstimate]) -> dict[str, float]:
     """By derivative the largest share of gusts among the coefficients that tell of them."""
     gusts = {name.partition("_")[0]: one.gusts for name, one in online.items()}
-    largest = {c: max(gusts.get(one, 0.0) for one in TELLING.get(c, (c,))) for c in gusts}
+    largest = dict(zip(gusts, share_by_axis(list(gusts), np.array(list(gusts.values()))).tolist(), strict=True))
     return {name: largest[name.partition("_")[0]] for name in online}
 
 

@@ -17,6 +17,7 @@ the same instruments, and so the largest ratio among their moments.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +32,21 @@ Array = NDArray[np.float64]
 ALLOWED = 0.05  # correlation between instruments and gusts, where surfaces are moved on purpose
 ANSWERED = 0.15  # that correlation where the gusts' moments have the energy of the moments by deflections
 MOMENTS = ("Cl", "Cm", "Cn")
+#: By coefficient those whose residuals tell of gusts in its regressors, which are the same for a whole axis. What is
+#: left of the drag counts for the drag alone: most of it is of a polar that no derivative describes.
+TELLING = {"CL": ("CL", "Cm"), "CD": ("CL", "CD", "Cm"), "Cm": ("CL", "Cm")}
+TELLING |= dict.fromkeys(("CY", "Cl", "Cn"), ("CY", "Cl", "Cn"))
 
 
 def share_of_gusts(density: Array, sensed: Array) -> Array:
     """(..., C) share of a residual's ``density`` that is not the sensors' noise, which has the density ``sensed``."""
     return np.asarray(np.clip(1.0 - DOUBT * sensed / np.maximum(density, 1e-300), 0.0, 1.0))
+
+
+def share_by_axis(coefficients: Sequence[str], gusts: Array) -> Array:
+    """(C,) of each of the ``coefficients`` the largest share of ``gusts`` (C,) among those that tell of them there."""
+    known = dict(zip(coefficients, gusts.tolist(), strict=True))
+    return np.array([max(known.get(one, 0.0) for one in TELLING.get(c, (c,))) for c in coefficients])
 
 
 def inflation(spread: Uncertainty, gusts: Array, answered: Array) -> Array:

@@ -53,8 +53,9 @@ def solved_equations(state: EstimatorState, total: Information, gram: Array) -> 
     gusts = gust_correlation.share_of_gusts(spread.density, sensed)
     statistical = spread
     if equations.least_squares and gusts.any():
-        bias = _gust_bias(state, total, gram, solution, gusts)
-        spread = replace(spread, covariance=spread.covariance + bias)
+        unbiased = _covariance_in_gusts(state, total, gram, solution)
+        share = gust_correlation.share_by_axis(equations.structure.coefficients, gusts)[:, None, None]
+        spread = replace(spread, covariance=(1.0 - share) * spread.covariance + share * unbiased)
     checks = _instrument_checks(state, total, gram, strength, solution, spread, noise_alone, gusts)
     answered = gust_correlation.of_solution(equations, solution, gram, gusts)
     inflation = gust_correlation.inflation(spread, gusts, answered)
@@ -103,19 +104,19 @@ def _instrument_checks(
     )
 
 
-def _gust_bias(state: EstimatorState, total: Information, gram: Array, solution: Solution, gusts: Array) -> Array:
-    """(C, P, P) allowance for the bias that gusts leave in least squares: its difference from what instruments find.
+def _covariance_in_gusts(state: EstimatorState, total: Information, gram: Array, solution: Solution) -> Array:
+    """(C, P, P) mean squared errors of least squares where all of the residual is of gusts.
 
-    Regressors that are their own instruments hold the gusts that are in the residual. Instruments do not (Hausman
-    (1978), Econometrica 46(6)). The difference d tells of the bias as far as the instruments' estimate is known, so
-    that d d' and its covariance are added, as far as the residual is of gusts: ``gusts`` (C,), none in still air.
+    Regressors that are their own instruments hold the gusts that are in the residual, other instruments do not. What
+    is known of the truth is then the solution by instruments with its covariance, and least squares is off from it by
+    the difference d of both (Hausman (1978), Econometrica 46(6)): d d' and that covariance.
     """
     full = state.model.instrumented
     unbiased = least_squares.solve(full, gram)
     known = least_squares.uncertainty(full, unbiased, total).covariance
     factor = np.sqrt(least_squares.instrument_strength(full, unbiased, total).selection_factor)
     off = (solution.theta - unbiased.theta).T
-    return np.asarray(gusts[:, None, None] * (off[:, :, None] * off[:, None, :] + known * np.outer(factor, factor)))
+    return np.asarray(off[:, :, None] * off[:, None, :] + known * np.outer(factor, factor))
 
 
 def _reconstruction_covariance(state: EstimatorState, solution: Solution, total: Information) -> Array:
