@@ -96,3 +96,9 @@ def test_what_sensors_leave_is_no_gust_that_surfaces_answer() -> None:
 
 def test_a_surface_that_never_moved_says_nothing() -> None:
     np.testing.assert_allclose(correlation(moved=0.0, left=4.0)[:2], 0.0)
+
+
+def test_a_residual_tells_of_the_gusts_in_the_regressors_of_its_axis() -> None:
+    """The drag's for the drag alone, lift's and pitching moment's for all three."""
+    found = gust_correlation.share_by_axis(["CL", "CD", "Cm", "CY", "Cl"], np.array([0.1, 0.9, 0.3, 0.0, 0.6]))
+    np.testing.assert_allclose(found, [0.3, 0.9, 0.3, 0.6, 0.6])
