@@ -308,7 +308,8 @@ def _projection(
     chosen = np.zeros(2 * N, dtype=bool)
     first, made = columns.servos.start, columns.instruments
     exogenous = [*place[changes.layout.deflections], *range(first, first + len(changes.layout.timed))]
-    exogenous += range(made.start, made.stop)
+    if freed or not equations.least_squares:  # else the regressors, which hold more, stand in their place
+        exogenous += range(made.start, made.stop)
     chosen[exogenous] = True
     chosen[N:] = chosen[:N]
     unknowns = of_block & (equations.columns == equations.instruments) & (not freed)

@@ -69,21 +69,16 @@ def test_half_the_elevator_is_lost(gusts: float, closed_loop: bool, method: str)
     assert noticed >= 5
 
 
-@pytest.mark.parametrize(("gusts", "method", "least"), [(0.7, "iv_rft", 5), (1.5, "sls_rft", 4)])
-def test_servos_of_unknown_time_do_not_hide_that_half_the_elevator_is_lost(
-    gusts: float, method: str, least: int
-) -> None:
-    """The servos' estimated times move with most renewals: announced by 34 s in most of six flights all the same.
-
-    By least squares, which gusts bias, in 13 of 18 flights with other seeds.
-    """
+@pytest.mark.parametrize(("gusts", "method"), [(0.7, "iv_rft"), (1.5, "sls_rft")])
+def test_servos_of_unknown_time_do_not_hide_that_half_the_elevator_is_lost(gusts: float, method: str) -> None:
+    """The servos' estimated times move with most renewals: announced by 34 s in five of six flights all the same."""
     time, flights = with_half_the_elevator(gusts, True)
     silent, noticed = replace(AIRCRAFT, ideal=False), 0
     for samples in flights:
         times = announced(run(silent, OnlineSettings(method=method), time, samples, np.arange(5.0, 36.0, 0.25)))
         assert not times or times[0] > LOST_AT
         noticed += bool(times) and times[0] <= LOST_AT + 4.0
-    assert noticed >= least
+    assert noticed >= 5
 
 
 def known(time: float, theta: float) -> ReferenceEstimates:
