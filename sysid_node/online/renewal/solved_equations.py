@@ -33,7 +33,7 @@ class SolvedEquations(NamedTuple):
     solution: Solution
     compensation: Array | None  # noise's part of the normal equations
     noise: Array | None  # (W, W) of which that was made, per line and second
-    statistical: Uncertainty  # of later flight: the bias that gusts leave is the same there
+    statistical: Uncertainty  # without the bias by gusts, which is the same in later flight
     spread: Uncertainty  # with that bias
     inflation: Array  # (C,) factors of the variances by gusts
     gusts: Array  # (C,) share of the residuals that is not the sensors' noise
