@@ -179,7 +179,7 @@ class Search:
         "1",
         "deviance by which a variant of an effect, or one with an onset, must be better for each parameter more",
     )
-    relief: float = _threshold(
+    prior_gain: float = _threshold(
         3.0,
         "nat",
         "nats by which a candidate must make the derivatives more probable, by the file's tolerances, to be fitted for "

@@ -117,8 +117,8 @@ class Equations:
         moved = velocity_rate(force.times(1.0 / self.aircraft.mass), gravity, turning, velocity)
         faster, alpha_rate, beta_rate = flow_rates(velocity, moved, np)
         unsteady = self.aircraft.effect_values().get("unsteady_aerodynamics", {})
-        relief = area / (self.aircraft.mass * V * np.cos(beta)) * chord
-        alpha_rate = alpha_rate / (1.0 + relief * unsteady.get("CL_alphadot", 0.0))
+        reduction = area / (self.aircraft.mass * V * np.cos(beta)) * chord
+        alpha_rate = alpha_rate / (1.0 + reduction * unsteady.get("CL_alphadot", 0.0))
         late = area * geometry.cbar * chord * unsteady.get("Cm_alphadot", 0.0) * alpha_rate
         moment = moment.plus(Vector(0.0, late, 0.0))
         spun = angular_acceleration(_known_or_one(self.aircraft.inertia), turning, moment)

@@ -238,12 +238,12 @@ def _is_large(scores: ComparisonScores, limits: Acceptance) -> bool:
     channels = scores.channels
     if np.any(channels_improved(channels, limits) & (channels.contribution > limits.share_of_gap)):
         return True
-    if relieves(scores.shifts, scores.searched, limits) or scores.added.bias > limits.bias:
+    if is_favoured_by_derivatives(scores.shifts, scores.searched, limits) or scores.added.bias > limits.bias:
         return True
     return bool(readings_improved(scores.readings, limits).any())
 
 
-def relieves(
+def is_favoured_by_derivatives(
     shifts: tuple[DerivativeShift, DerivativeShift], searched: int, limits: Acceptance = THRESHOLDS.acceptance
 ) -> bool:
     """Whether the derivatives' joint prior favours the candidate beyond doubt, and they are plausible with it.

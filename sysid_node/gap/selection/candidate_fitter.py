@@ -65,12 +65,14 @@ class CandidateFitter:
                 new,
                 lambda share: progress(0.5 * share, "a first look at every effect"),
             )
-            return {each.candidate.label: [each.deviance, each.relief, *each.start] for each in found}
+            return {each.candidate.label: [each.deviance, each.prior_gain, *each.start] for each in found}
 
         if new:
             table = self.checkpoint.table(current.fit, [candidate.label for candidate in new], work)
             rows = [(candidate, table[candidate.label]) for candidate in new if candidate.label in table]
-            known.update({c.label: Screened(left, c, tuple(start), relief) for c, (left, relief, *start) in rows})
+            known.update(
+                {c.label: Screened(left, c, tuple(start), prior_gain) for c, (left, prior_gain, *start) in rows}
+            )
         return sorted((known[c.label] for c in candidates if c.label in known), key=lambda each: each.deviance)
 
     def screen_upon(

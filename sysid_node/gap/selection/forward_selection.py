@@ -26,7 +26,12 @@ from sysid_node.gap.instruments.overidentification import (
     pooled_overidentification,
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
-from sysid_node.gap.selection.acceptance import is_accepted, nats_by_tolerances, predicts_better, relieves
+from sysid_node.gap.selection.acceptance import (
+    is_accepted,
+    is_favoured_by_derivatives,
+    nats_by_tolerances,
+    predicts_better,
+)
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress, in_parallel
 from sysid_node.gap.selection.causes import Cause, Selection, select_causes
 from sysid_node.gap.selection.comparison import Comparison, derivative_shift
@@ -70,9 +75,11 @@ class Attribution:
         return self.size_source or self.corrected
 
     @property
-    def relieves_derivatives(self) -> bool:
+    def is_favoured_by_derivatives(self) -> bool:
         """Whether the derivatives are plausible together beside the causes, and much less so without them."""
-        return relieves((derivative_shift(self.base.fit), derivative_shift(self.chosen.fit)), len(EFFECTS))
+        return is_favoured_by_derivatives(
+            (derivative_shift(self.base.fit), derivative_shift(self.chosen.fit)), len(EFFECTS)
+        )
 
     def has_less_plausible_derivatives_than(self, larger: Attribution) -> bool:
         """Whether the derivatives together are less plausible than beside the causes of a larger explanation.
@@ -206,7 +213,7 @@ def _forward(
         fitted = fitter.fit_screened(best_screened(pairs, most), _share_of(progress, count))
         candidates = with_found_starts(candidates, [pair.screened for pair in pairs])
         stages.append([larger for _, larger in fitted])
-        accepted = in_parallel(partial(_is_better, base, best), fitted, lambda share: None)
+        accepted = in_parallel(partial(is_better, base, best), fitted, lambda share: None)
         better = [larger for (_, larger), is_better in zip(fitted, accepted, strict=True) if is_better]
         if not better:
             break
@@ -214,7 +221,7 @@ def _forward(
     return best, stages
 
 
-def _is_better(base: FittedSet, best: FittedSet, pair: tuple[FittedSet, FittedSet]) -> bool:
+def is_better(base: FittedSet, best: FittedSet, pair: tuple[FittedSet, FittedSet]) -> bool:
     """Whether the larger of two explanations is accepted beside the smaller, and in place of the best so far.
 
     Where it holds the best so far and one candidate more, that one counts, whichever of them was added first.

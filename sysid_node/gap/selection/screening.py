@@ -31,7 +31,7 @@ class Screened(NamedTuple):
     deviance: float
     candidate: Candidate
     start: tuple[float, ...]
-    relief: float = 0.0  # nats by which the derivatives are more probable with it, by the file's tolerances
+    prior_gain: float = 0.0  # nats by which the derivatives are more probable with it, by the file's tolerances
 
 
 class ScreenedPair(NamedTuple):
@@ -92,7 +92,7 @@ def _with_derivatives_released(fit: CandidateFit, problem: VariableProjection, f
         deviance = extended.deviance(values)
         if deviance < found.deviance:
             found = Screened(deviance, found.candidate, tuple(values[fit.values.size :].tolist()))
-    return found._replace(relief=fit.at(extended.points(values)).derivative_score - fit.derivative_score)
+    return found._replace(prior_gain=fit.at(extended.points(values)).derivative_score - fit.derivative_score)
 
 
 def best_screened(pairs: Sequence[ScreenedPair], most: int, thresholds: Thresholds = THRESHOLDS) -> list[ScreenedPair]:
@@ -105,11 +105,11 @@ def best_screened(pairs: Sequence[ScreenedPair], most: int, thresholds: Threshol
     counts: Counter[tuple[int, str]] = Counter()
     seen: set[tuple[int, str]] = set()
     kept, likely = [], _likely_variants(pairs, thresholds)
-    relieving = _relieving(likely, thresholds)
+    most_probable = _most_probable_derivatives(likely, thresholds)
     for pair in likely:
         explanation, candidate = id(pair.explanation), pair.screened.candidate
         law = f"{candidate.effect} {candidate.law}"
-        if pair is relieving.get(explanation):
+        if pair is most_probable.get(explanation):
             kept.append(pair)
         elif counts[explanation, ""] < most and counts[explanation, law] < thresholds.search.per_effect:
             again = candidate.effect in SHARED and (explanation, candidate.effect) in seen
@@ -119,13 +119,13 @@ def best_screened(pairs: Sequence[ScreenedPair], most: int, thresholds: Threshol
     return kept
 
 
-def _relieving(pairs: Sequence[ScreenedPair], thresholds: Thresholds) -> dict[int, ScreenedPair]:
+def _most_probable_derivatives(pairs: Sequence[ScreenedPair], thresholds: Thresholds) -> dict[int, ScreenedPair]:
     """By explanation the pair that makes the derivatives most probable; none where that is little."""
     best: dict[int, ScreenedPair] = {}
     for pair in pairs:
         known = best.get(id(pair.explanation))
-        least = thresholds.search.relief if known is None else known.screened.relief
-        if pair.screened.relief > least:
+        least = thresholds.search.prior_gain if known is None else known.screened.prior_gain
+        if pair.screened.prior_gain > least:
             best[id(pair.explanation)] = pair
     return best
 

@@ -30,10 +30,10 @@ def pitching_moment(values: Values, rate: Scalar) -> Scalar:
     return values["Cm_alphadot"] * rate
 
 
-def solve_rate(values: Values, rate: Scalar, relief: Scalar) -> Scalar:
+def solve_rate(values: Values, rate: Scalar, reduction: Scalar) -> Scalar:
     """dalpha/dt (rad/s) with this lift, from ``rate`` (rad/s), its value without the lift.
 
-    The lift is normal to the flow and therefore reduces the rate by relief * CL_alphadot * dalpha/dt, where
-    relief = qbar S cbar / (2 V m) / (speed in the x-z plane). The equation is linear and is solved in closed form.
+    The lift is normal to the flow and therefore reduces the rate by reduction * CL_alphadot * dalpha/dt, where
+    reduction = qbar S cbar / (2 V m) / (speed in the x-z plane). The equation is linear and is solved in closed form.
     """
-    return rate / (1.0 + relief * values["CL_alphadot"])
+    return rate / (1.0 + reduction * values["CL_alphadot"])

@@ -132,8 +132,8 @@ def rate_of_alpha(chain: Chain, air: Air, velocity_rate: Vector) -> Scalar:
     forward = u * u + w * w
     without = (u * velocity_rate.z - w * velocity_rate.x) / forward
     pressure_area = air.pressure * chain.model.area
-    relief = pressure_area * chain.model.chord / (2.0 * air.speed * chain.body.mass * jnp.sqrt(forward))
-    return unsteady_aerodynamics.solve_rate(chain.effects["unsteady_aerodynamics"], without, relief)
+    reduction = pressure_area * chain.model.chord / (2.0 * air.speed * chain.body.mass * jnp.sqrt(forward))
+    return unsteady_aerodynamics.solve_rate(chain.effects["unsteady_aerodynamics"], without, reduction)
 
 
 def separation_rate(chain: Chain, air: Air, separation: Scalar, alpha_rate: Scalar) -> Scalar:

@@ -87,18 +87,18 @@ def test_another_mass_is_seen_although_derivatives_have_gone_to_their_limits(air
     found = screened(fit, problem, mass)
     assert found.start[0] == pytest.approx(0.5, rel=0.3)
     assert found.deviance < problem.deviance(np.empty(0)) - 20.0
-    assert found.relief > THRESHOLDS.search.relief  # the derivatives come back within their tolerances
+    assert found.prior_gain > THRESHOLDS.search.prior_gain  # the derivatives come back within their tolerances
 
 
 def test_what_makes_the_derivatives_most_probable_is_fitted_although_it_removes_little() -> None:
     """As another mass does, for which all derivatives had made up."""
-    base, least = explanation(), THRESHOLDS.search.relief
-    reliefs = {"stall_separation": 0.0, "imu_scale": 1.1 * least, "vane_scale": 0.0, "mass_error": 2.0 * least}
+    base, least = explanation(), THRESHOLDS.search.prior_gain
+    gains = {"stall_separation": 0.0, "imu_scale": 1.1 * least, "vane_scale": 0.0, "mass_error": 2.0 * least}
 
     def kept(share: float) -> list[str]:
         pairs = [
-            ScreenedPair(base, Screened(float(k), labelled(name), (0.1,), share * relief))
-            for k, (name, relief) in enumerate(reliefs.items())
+            ScreenedPair(base, Screened(float(k), labelled(name), (0.1,), share * gain))
+            for k, (name, gain) in enumerate(gains.items())
         ]
         return [pair.screened.candidate.effect for pair in best_screened(pairs, 2)]
 

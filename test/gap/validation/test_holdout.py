@@ -21,7 +21,7 @@ class Explanation:
     chosen: Any = None
     causes: tuple[str, ...] = ("a cause",)
     smaller: tuple[float, ...] = ()  # with fewer causes
-    relieves_derivatives: bool = False
+    is_favoured_by_derivatives: bool = False
     keeps_file_derivatives: bool = False
     strained: bool = False  # the derivatives, more than with more causes
     held: float | None = None  # with its insignificant sizes held at the file's values; none where it has none
