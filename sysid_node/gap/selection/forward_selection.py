@@ -3,7 +3,8 @@
 Candidates are added one at a time, up to three, each where it is accepted (``acceptance``). Then every cause is
 compared with its alternatives (``alternatives``), and those that are improbable are dropped or replaced (``causes``).
 Where some were, the selection goes on from those that are left, as stepwise regression does (Efroymson (1960), in
-Ralston & Wilf, Mathematical Methods for Digital Computers): beside a wrong cause the right one may not have been seen.
+Ralston & Wilf, Mathematical Methods for Digital Computers): beside a wrong cause the right one may not have been seen,
+and what was not needed beside a cause may be needed beside what took its place.
 """
 
 from __future__ import annotations
@@ -157,8 +158,11 @@ def attribute(
     variants = {each.effect for each in chosen.fit.candidates if each.effect in SHARED}
     always = [each for each in candidates if each.effect in RESPONSE_DELAYS | variants]
     selection = select_causes(fitter, base, chosen, stages, always)
-    progress(0.9, "what else there is in place of doubted causes")
-    chosen, causes, doubted = _selected_again(fitter, base, selection, stages, candidates, always)
+    progress(0.9, "what else there is in place of causes that were dropped")
+    kept, causes, doubted = selection
+    if causes and (doubted or len(kept.fit.candidates) < len(chosen.fit.candidates)):
+        selection = _selected_again(fitter, base, selection, stages, candidates, always)
+    chosen, causes, doubted = selection
     return Attribution(
         base=base,
         chosen=chosen,
@@ -181,14 +185,12 @@ def _selected_again(
     candidates: Sequence[Candidate],
     always: Sequence[Candidate],
 ) -> Selection:
-    """A selection after the search went on without the doubted causes; the first one where that predicts no better.
+    """A selection after the search went on from the causes that were kept; the first one where that predicts no better.
 
-    It goes on from causes that are kept: without any, every candidate has been tried alone.
+    Doubted causes are left out. Without any cause that is kept, every candidate has been tried alone.
     """
-    chosen, causes, doubted = first
+    chosen, _, doubted = first
     left_out = {cause.candidate.label for cause in doubted}
-    if not causes or not doubted:
-        return first
     rest = [each for each in candidates if each.label not in left_out]
     larger, more = _forward(fitter, base, chosen, rest, lambda share, text: None)
     if larger is chosen:
