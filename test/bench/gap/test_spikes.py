@@ -258,3 +258,10 @@ def test_late_commands_beside_a_lag_are_no_servo_of_second_order() -> None:
     assert {cause["label"] for cause in causes} == {"command_delay", "actuator_lag"}
     (delay,) = (cause["parameters"]["elevator"] for cause in causes if cause["effect"] == "command_delay")
     assert delay[0] == pytest.approx(0.09, rel=0.2)
+
+
+@pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
+def test_what_was_dropped_beside_one_cause_is_looked_for_beside_what_took_its_place() -> None:
+    """Beside slow servos of all surfaces half an aileron is not needed; slow ailerons alone leave it to be found."""
+    causes = diagnosed(RECORDS, Case(0, "cessna_da", "control_effectiveness_loss", {"aileron": 0.46}))["causes"]
+    assert {cause["label"] for cause in causes} == {"actuator_lag of aileron", "control_effectiveness_loss of aileron"}
