@@ -187,11 +187,17 @@ def _selected_again(
 ) -> Selection:
     """A selection after the search went on from the causes that were kept; the first one where that predicts no better.
 
-    Doubted causes are left out. Without any cause that is kept, every candidate has been tried alone.
+    Doubted causes are left out. Without any cause that is kept, every candidate has been tried alone. Where none was
+    doubted, only what has been fitted beside the causes that were kept is tried again, which costs little.
     """
     chosen, _, doubted = first
-    left_out = {cause.candidate.label for cause in doubted}
-    rest = [each for each in candidates if each.label not in left_out]
+    left_out, kept = (
+        {cause.candidate.label for cause in doubted},
+        frozenset(each.label for each in chosen.fit.candidates),
+    )
+    rest = [
+        each for each in candidates if each.label not in left_out and (doubted or kept | {each.label} in fitter.fitted)
+    ]
     larger, more = _forward(fitter, base, chosen, rest, lambda share, text: None)
     if larger is chosen:
         return first
