@@ -191,13 +191,12 @@ def _selected_again(
     doubted, only what has been fitted beside the causes that were kept is tried again, which costs little.
     """
     chosen, _, doubted = first
-    left_out, kept = (
-        {cause.candidate.label for cause in doubted},
-        frozenset(each.label for each in chosen.fit.candidates),
-    )
-    rest = [
-        each for each in candidates if each.label not in left_out and (doubted or kept | {each.label} in fitter.fitted)
-    ]
+    if doubted:
+        left_out = {cause.candidate.label for cause in doubted}
+        rest = [each for each in candidates if each.label not in left_out]
+    else:
+        kept = frozenset(each.label for each in chosen.fit.candidates)
+        rest = [each for each in candidates if kept | {each.label} in fitter.fitted]
     larger, more = _forward(fitter, base, chosen, rest, lambda share, text: None)
     if larger is chosen:
         return first
@@ -222,7 +221,7 @@ def _forward(
         candidates = with_found_starts(candidates, [pair.screened for pair in pairs])
         stages.append([larger for _, larger in fitted])
         accepted = in_parallel(partial(is_better, base, best), fitted, lambda share: None)
-        better = [larger for (_, larger), is_better in zip(fitted, accepted, strict=True) if is_better]
+        better = [larger for (_, larger), stands in zip(fitted, accepted, strict=True) if stands]
         if not better:
             break
         best, frontier = better[0], better
