@@ -135,8 +135,11 @@ def processor_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def listen(node, flight: BaseProcess, pid: int) -> tuple[list[tuple[int, int]], dict[str, str], float]:
-    """Latencies (ns) until publication and arrival, last words of /diagnostics by key, the node's share of a core."""
+def listen(node, flight: BaseProcess, pid: int, bare: bool) -> tuple[list[tuple[int, int]], dict[str, str], float]:
+    """Start the flight once the node's topics are there, and listen to its end.
+
+    Latencies (ns) until publication and arrival, last words of /diagnostics by key, the node's share of a core.
+    """
     latencies: list[tuple[int, int]] = []
     words: dict[str, str] = {}
     used = began = 0.0
@@ -151,8 +154,13 @@ def listen(node, flight: BaseProcess, pid: int) -> tuple[list[tuple[int, int]], 
     def on_diagnostics(message) -> None:
         words.update({pair.key: pair.value for status in message.status for pair in status.values})
 
-    node.create_subscription(DerivativeEstimates, "/identifier/derivatives", on_estimates, 100)
-    node.create_subscription(DiagnosticArray, "/diagnostics", on_diagnostics, 10)
+    heard = (
+        node.create_subscription(DerivativeEstimates, "/identifier/derivatives", on_estimates, 100),
+        node.create_subscription(DiagnosticArray, "/diagnostics", on_diagnostics, 10),
+    )
+    while not all(subscription.get_publisher_count() for subscription in heard[: 1 if bare else 2]):
+        time.sleep(0.05)  # what is published before this program is known to the node would not reach it
+    flight.start()
     executor = SingleThreadedExecutor()  # the events executor gives callbacks no message info
     executor.add_node(node)
     while flight.is_alive():
@@ -193,8 +201,7 @@ def measure(seconds: float, bare: bool, together: bool) -> None:
     node = rclpy.create_node("bench")
     flight = get_context("spawn").Process(target=fly, args=(seconds, together), daemon=True)
     with started(bare) as process:
-        flight.start()
-        latencies, words, share = listen(node, flight, process.pid)
+        latencies, words, share = listen(node, flight, process.pid, bare)
     node.destroy_node()
     ticks = int(seconds * IMU_RATE) + 1
     sent, lost, rejected = ticks + 2 * (1 + (ticks - 1) // SLOW_EVERY), "", ""
