@@ -2,7 +2,7 @@
 
 Simulator, identifier, exciter, fault monitor and controller; `bag:=NAME` records what they say. Then
 `ros2 service call /exciter/start std_srvs/srv/Trigger`, and let something fail:
-`ros2 param set /flight_simulator effects control_effectiveness_loss:elevator=0.6`.
+`ros2 param set /flight_simulator effects "actuator_lag:time_constant=0.05 control_effectiveness_loss:elevator=0.6"`.
 When one of the nodes ends, all of them do.
 """
 
@@ -19,7 +19,8 @@ from launch_ros.parameter_descriptions import ParameterValue
 CONFIG = Path(get_package_share_directory("sysid_node"), "config")
 RECORDED = (
     *("imu/data", "air_data", "actuators", "actuators/command", "actuators/excitation", "set_points"),
-    *("identifier/derivatives", "adaptive_controller/tracking", "fault_monitor/faults", "pose"),
+    *("identifier/derivatives", "identifier/model_gap", "identifier/correlation"),
+    *("adaptive_controller/tracking", "fault_monitor/faults", "pose"),
 )
 
 
@@ -88,7 +89,11 @@ def generate_launch_description() -> LaunchDescription:
         "effects": value(argument("effects"), value_type=str),
         "surfaces": value(argument("surfaces"), value_type=str),
     }
-    method = value(argument("method"), value_type=str)
+    surfaces = ["'commands' if '", argument("surfaces"), "' == 'commanded' else 'positions'"]
+    identification = {
+        "method": value(argument("method"), value_type=str),
+        "actuators": value(PythonExpression(surfaces), value_type=str),
+    }
     adapt = value(argument("adapt"), value_type=bool)
     prefix = PythonExpression(["('/' + '", namespace, "'.strip('/')).rstrip('/')"])
     topics = [[prefix, f"/{topic}"] for topic in RECORDED]
@@ -96,7 +101,7 @@ def generate_launch_description() -> LaunchDescription:
         [
             *arguments(),
             Node(**described("flight_simulator", **sky)),
-            LifecycleNode(**described("identifier", method=method, **simulated)),
+            LifecycleNode(**described("identifier", **identification, **simulated)),
             Node(**described("exciter", watch=True, accuracy=0.15, **simulated)),
             Node(**described("fault_monitor", **simulated)),
             Node(**described("adaptive_controller", adapt=adapt, **simulated)),

@@ -41,6 +41,24 @@ class NodeParameter:
         return f"{kind[type(self.default)]}{allowed}, e.g. {_yaml(self.default)}"
 
 
+#: Parameters that several nodes have.
+AIRCRAFT = NodeParameter(
+    "aircraft",
+    "",
+    "",
+    "The aircraft: a name in config/aircraft, e.g. cdrw, or the path of an aircraft file. Needed.",
+    "For every aircraft.",
+)
+BODY_FRAME = NodeParameter(
+    "body_frame",
+    "flu",
+    "",
+    "Axes of imu/data: flu is forward-left-up (REP-103), frd is forward-right-down.",
+    "Where the autopilot's driver publishes the IMU in forward-right-down axes.",
+    choices=("flu", "frd"),
+)
+
+
 def setting(
     defaults: object, ranges: Mapping[str, tuple[float, float]], name: str, unit: str, meaning: str, change: str
 ) -> NodeParameter:

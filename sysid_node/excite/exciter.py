@@ -77,7 +77,8 @@ class ExciterState:
     settings: ExcitationSettings
     table: Array  # (N, controls) rad at RATE
     estimates: EstimateWatch
-    events: list[ExcitationEvent] = field(default_factory=list)
+    events: list[ExcitationEvent] = field(default_factory=list)  # the last ``EVENTS``
+    happened: int = 0  # number of all events
     begun: float = math.nan  # s; NaN = not exciting
     armed: bool = False  # whether excitation may begin again when a derivative is no longer valid
     watching: bool = False  # whether it may when a fault is reported: also after it was given up
@@ -224,3 +225,4 @@ def _end(state: ExciterState, time: float, why: str) -> None:
 def _log(state: ExciterState, time: float, text: str) -> None:
     state.events.append(ExcitationEvent(time, text))
     del state.events[:-EVENTS]
+    state.happened += 1

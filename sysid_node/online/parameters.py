@@ -11,26 +11,13 @@ from typing import Any
 
 from sysid_node.flight.commanded import CARRIED
 from sysid_node.online.settings import METHODS, OnlineSettings
-from sysid_node.parameter import NodeParameter, annotated_yaml, check_each
+from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, annotated_yaml, check_each
 
 _ESTIMATOR = OnlineSettings()
 
 PARAMETERS = (
-    NodeParameter(
-        "aircraft",
-        "",
-        "",
-        "The aircraft: a name in config/aircraft, e.g. cdrw, or the path of an aircraft file. Needed.",
-        "For every aircraft.",
-    ),
-    NodeParameter(
-        "body_frame",
-        "flu",
-        "",
-        "Axes of imu/data: flu is forward-left-up (REP-103), frd is forward-right-down.",
-        "Where the autopilot's driver publishes the IMU in forward-right-down axes.",
-        choices=("flu", "frd"),
-    ),
+    AIRCRAFT,
+    BODY_FRAME,
     NodeParameter(
         "publish_rate",
         20.0,

@@ -27,11 +27,10 @@ from sysid_node.flight.live.arrivals import Arrivals
 from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.parameter import NodeParameter, setting
+from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, setting
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.conversion import NANOSECONDS, stamp_ns
 from sysid_node.ros.support.loop_node import (
-    AIRCRAFT,
     COMMAND,
     CORRELATION,
     DERIVATIVES,
@@ -52,6 +51,7 @@ _setting = partial(setting, _DEFAULT, RANGES)
 
 PARAMETERS = (
     AIRCRAFT,
+    BODY_FRAME,
     NodeParameter(
         "adapt",
         True,
@@ -193,7 +193,7 @@ class AdaptiveController(LoopNode):
         return {f"{axis.axis.name} gains": axis.verdict for axis in self._state.axes}
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:
-        stamp, (_x, _y, _z, p, q, r), (phi, theta) = messages.imu_and_attitude(numbers)
+        stamp, (_x, _y, _z, p, q, r), (phi, theta) = messages.imu_and_attitude(numbers, self.values["body_frame"])
         self._start_ns = self._start_ns or stamp
         now = (stamp - self._start_ns) / NANOSECONDS
         if not self._imu.arrived(now):
@@ -210,9 +210,7 @@ class AdaptiveController(LoopNode):
         self._air = (stamp - self._start_ns) / NANOSECONDS, values
 
     def _on_estimates(self, message: Any) -> None:
-        if message.aircraft != self.aircraft.name:
-            ours = f"of aircraft {message.aircraft!r}, left out: this node flies {self.aircraft.name!r}"
-            self._wrong[self.inputs[DERIVATIVES].name] = ours
+        if not self.is_ours(message):
             return
         estimates = conversion.estimates_from_message(message, self._start_ns)
         self._others[DERIVATIVES].arrived(stamp_ns(message.header.stamp) / NANOSECONDS)

@@ -24,9 +24,9 @@ from sysid_node.faults.types import DAMAGE, HARD_OVER, LOSS, NOT_FOLLOWING, SHIF
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
 from sysid_node.flight.topics import AIR_DATA, IMU
-from sysid_node.parameter import NodeParameter, setting
+from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, setting
 from sysid_node.ros.support import conversion
-from sysid_node.ros.support.loop_node import AIRCRAFT, DERIVATIVES, EXCITATION, LATEST, LoopNode, named
+from sysid_node.ros.support.loop_node import DERIVATIVES, EXCITATION, LATEST, LoopNode, named
 from sysid_node.ros.support.spin import run_node
 
 _DEFAULT = ExcitationSettings()
@@ -34,6 +34,7 @@ _setting = partial(setting, _DEFAULT, RANGES)
 
 PARAMETERS = (
     AIRCRAFT,
+    BODY_FRAME,
     NodeParameter(
         "manoeuvre",
         "+".join(_DEFAULT.manoeuvre),
@@ -105,12 +106,12 @@ class Exciter(LoopNode):
         values = {
             "active": state.active,
             "not yet known": " ".join(state.estimates.missing),
-            "events": len(state.events),
+            "events": state.happened,
         }
         return DiagnosticStatus.OK, doing, {**values, "last event": last}
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:
-        stamp, values, attitude = messages.imu_and_attitude(numbers)
+        stamp, values, attitude = messages.imu_and_attitude(numbers, self.values["body_frame"])
         self._inertial = time.monotonic(), (*attitude, -values[2] / GRAVITY)
         self._start_ns = self._start_ns or stamp
         self._now = (stamp - self._start_ns) / conversion.NANOSECONDS
@@ -119,6 +120,8 @@ class Exciter(LoopNode):
         self._air = time.monotonic(), messages.air_data(numbers)[1][0]
 
     def _on_estimates(self, message: Any) -> None:
+        if not self.is_ours(message):
+            return
         estimates = conversion.estimates_from_message(message, 0)
         known = {n: d for n, d in estimates.derivatives.items() if n in self.aircraft.derivatives}
         precision = relative_precision(known.values(), self.aircraft)
@@ -160,9 +163,10 @@ class Exciter(LoopNode):
 
     def _log_events(self) -> None:
         """Log the events since the last call."""
-        for event in self._state.events[self._logged :]:
+        news = self._state.happened - self._logged
+        for event in self._state.events[len(self._state.events) - news :]:
             self.get_logger().info(event.text)
-        self._logged = len(self._state.events)
+        self._logged = self._state.happened
 
 
 def main() -> None:

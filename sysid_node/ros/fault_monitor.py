@@ -21,9 +21,9 @@ from sysid_node.flight.live import messages
 from sysid_node.flight.live.messages import PATHS, Numbers, Texts
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.parameter import NodeParameter, setting
+from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, setting
 from sysid_node.ros.support import conversion
-from sysid_node.ros.support.loop_node import AIRCRAFT, COMMAND, DERIVATIVES, LAG, SENSOR_QOS, LoopNode
+from sysid_node.ros.support.loop_node import COMMAND, DERIVATIVES, LAG, SENSOR_QOS, LoopNode
 from sysid_node.ros.support.spin import run_node
 
 _DEFAULT = FaultMonitorSettings()
@@ -31,6 +31,7 @@ _setting = partial(setting, _DEFAULT, RANGES)
 
 PARAMETERS = (
     AIRCRAFT,
+    BODY_FRAME,
     _setting("false_alarms", "1/h", "False alarms that chance may make.", "Up to find smaller faults sooner."),
     _setting("learning", "s", "At the start, in which nothing is judged.", "Up where the flight begins roughly."),
     _setting("memory", "s", "Over which the residuals' colour is learned.", "Down where the air changes quickly."),
@@ -89,7 +90,7 @@ class FaultMonitor(LoopNode):
     # Messages
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:
-        self._take(watching.on_imu, *messages.imu(numbers, -1.0))
+        self._take(watching.on_imu, *messages.imu(numbers, self.values["body_frame"]))
 
     def _on_air_data(self, numbers: Numbers, _: Texts) -> None:
         self._take(watching.on_air_data, *messages.air_data(numbers))
@@ -107,6 +108,8 @@ class FaultMonitor(LoopNode):
         watching.on_command(self._watch, *messages.actuators(numbers, texts))
 
     def _on_estimates(self, message: Any) -> None:
+        if not self.is_ours(message):
+            return
         watching.on_estimates(self._watch, identifier_estimates(message.derivatives, message.servos))
 
     # Reports

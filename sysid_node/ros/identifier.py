@@ -14,6 +14,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
@@ -25,6 +26,7 @@ from sysid_node.aircraft.stated_effects import not_taken_in_words
 from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
 from sysid_node.flight.cdr.message_reader import MessageReader, Text
+from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.conditions import Conditions
 from sysid_node.flight.live.messages import UNREADABLE, Numbers, Texts
@@ -59,6 +61,8 @@ class Identifier(CarefulNode):
         super().__init__("identifier")
         self._make_session = make_session
         self._session: Session | None = None
+        self._inputs: list[Any] = []  # subscriptions
+        self._outputs: list[Any] = []  # lifecycle publishers
         declare(self, PARAMETERS, check)
         self.add_on_set_parameters_callback(self._on_parameters)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -84,40 +88,42 @@ class Identifier(CarefulNode):
             raise InputError("parameter aircraft is empty: give a name or a file, e.g. --ros-args -p aircraft:=cdrw")
         aircraft = load_aircraft(values["aircraft"])
         self._session = self._make_session(aircraft, estimation_settings(values), values["publish_rate"])
-        self._sign = conversion.axes_sign(values["body_frame"])
+        self._body_frame: BodyFrame = values["body_frame"]
         self._frame_id = ""
         self._lag = math.nan  # s, from the stamp of the last published sample to its publication
         self._publish_times = Durations()
-        self._derivatives = self.create_lifecycle_publisher(DerivativeEstimates, "~/derivatives", 10)
-        self._model_gap = self.create_lifecycle_publisher(ModelGap, "~/model_gap", 10)
-        self._correlation = self.create_lifecycle_publisher(EstimateCorrelation, "~/correlation", LAST_QOS)
+        self._derivatives = self._publish_to(DerivativeEstimates, "~/derivatives", 10)
+        self._model_gap = self._publish_to(ModelGap, "~/model_gap", 10)
+        self._correlation = self._publish_to(EstimateCorrelation, "~/correlation", LAST_QOS)
         self._monitors = {topic: TopicMonitor(topic) for topic in (IMU, AIR_DATA, ACTUATORS)}
         self._recent, self._conditions = RecentCounts(), Conditions()
         self._joints: Text = ()  # the names of the last message about actuators
         self._carried = ""  # what was last said of the actuators' messages
         self._serialiser = EstimatesSerialiser(fields_of, aircraft.name, self._session.settings.method)
-        self._inputs = [
-            self._listen(Imu, IMU, self._on_imu),
-            self._listen(AirData, AIR_DATA, self._on_air_data),
-            self._listen(JointState, ACTUATORS, self._on_actuators),
-        ]
+        self._listen(Imu, IMU, self._on_imu)
+        self._listen(AirData, AIR_DATA, self._on_air_data)
+        self._listen(JointState, ACTUATORS, self._on_actuators)
         self.get_logger().info(f"identifies {aircraft.name!r}: {', '.join(aircraft.model_structure)}")
         if not_taken := not_taken_in_words(aircraft):
             self.get_logger().warning(not_taken)
 
     def cleanup(self) -> None:
-        """Destroy what ``configure`` made."""
-        if self._session is None:
-            return
+        """Destroy what ``configure`` made, even where it did not finish."""
         self._session = None
-        for subscription in self._inputs:
-            self.destroy_subscription(subscription)
-        for publisher in (self._derivatives, self._model_gap, self._correlation):
-            self.destroy_lifecycle_publisher(publisher)
+        while self._inputs:
+            self.destroy_subscription(self._inputs.pop())
+        while self._outputs:
+            self.destroy_lifecycle_publisher(self._outputs.pop())
+
+    def _publish_to(self, kind: Any, topic: str, profile: QoSProfile | int) -> Any:
+        """A publisher that ``cleanup`` destroys."""
+        publisher = self.create_lifecycle_publisher(kind, topic, profile)
+        self._outputs.append(publisher)
+        return publisher
 
     # Messages
 
-    def _listen(self, kind: Any, topic: str, take: Callable[[Session, Numbers, Texts], list[Due]]) -> Any:
+    def _listen(self, kind: Any, topic: str, take: Callable[[Session, Numbers, Texts], list[Due]]) -> None:
         """Subscribe to an input topic, and publish the estimates that fall due after each message.
 
         Messages stay serialised: to make objects of all their parts would take longer than the estimator does.
@@ -143,11 +149,11 @@ class Identifier(CarefulNode):
             kind, topic, self.guarded(on_message), SENSOR_QOS, qos_overriding_options=overrides, raw=True
         )
         monitor.resolved = subscription.topic_name
-        return subscription
+        self._inputs.append(subscription)
 
     def _on_imu(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
         self._frame_id = str(texts[0])
-        return session.imu(*messages.imu(numbers, self._sign))
+        return session.imu(*messages.imu(numbers, self._body_frame))
 
     def _on_air_data(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
         return session.air_data(*messages.air_data(numbers))

@@ -35,6 +35,8 @@ TOPICS: Mapping[str, str] = {
     "adaptive_controller/tracking": JOINTS,
     DERIVATIVES.lstrip("/"): DERIVATIVES_TYPE,
     "identifier/model_gap": "sysid_msgs/msg/ModelGap",
+    "identifier/correlation": "sysid_msgs/msg/EstimateCorrelation",
+    "pose": "geometry_msgs/msg/PoseStamped",
     "fault_monitor/faults": DIAGNOSTICS,
     "/diagnostics": DIAGNOSTICS,
 }

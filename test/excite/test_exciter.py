@@ -26,6 +26,15 @@ def last(state: exciter.ExciterState) -> str:
     return state.events[-1].text
 
 
+def test_all_events_are_counted_and_the_last_ones_kept(state: exciter.ExciterState) -> None:
+    for turn in range(exciter.EVENTS):
+        exciter.start(state, float(turn))
+        exciter.stop(state, float(turn) + 0.5, "stopped")
+    assert state.happened == 2 * exciter.EVENTS
+    assert len(state.events) == exciter.EVENTS
+    assert state.events[-1].time == exciter.EVENTS - 0.5
+
+
 def test_nothing_moves_until_asked(state: exciter.ExciterState) -> None:
     exciter.receive_estimates(state, 1.0, UNKNOWN)
     assert not exciter.step(state, 1.0, LEVEL).any()

@@ -347,8 +347,11 @@ def test_a_reported_fault_has_a_watching_exciter_begin_again_at_once(client: Cli
 
 def test_another_aircrafts_estimates_are_left_out(client: Client) -> None:
     def said() -> bool:
-        client.estimates.publish(DerivativeEstimates(header=client.header(), aircraft="kestrel"))
-        return "of aircraft 'kestrel', left out" in client.said(CONTROLLER)
+        foreign = DerivativeEstimates(header=client.header(), aircraft="kestrel")
+        client.estimates.publish(foreign)
+        client.others_estimates.publish(foreign)
+        hearers = (CONTROLLER, "uav3/exciter: state", "uav3/fault_monitor: state")
+        return all("of aircraft 'kestrel', left out" in client.said(name) for name in hearers)
 
     client.until(said)
 

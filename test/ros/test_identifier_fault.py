@@ -57,3 +57,23 @@ def test_it_says_so_and_flies_again(node: Identifier, probe: Probe) -> None:
     probe.until(lambda: probe.said("state", "state") == "active")
     assert probe.diagnostics["identifier: state"].level == b"\x00"
     assert probe.said("state", "exceptions in callbacks") == "1"
+
+
+class UnfinishedSession:
+    """A session without settings: what is made of it next fails."""
+
+    def __init__(self, *_: object) -> None:
+        pass
+
+
+def test_a_configuration_that_fails_half_way_can_be_begun_anew(ros: None) -> None:
+    one = Identifier(UnfinishedSession)  # type: ignore[arg-type]
+    try:
+        one.set_parameters([Parameter("aircraft", value="cdrw")])
+        one.trigger_configure()
+        assert one.state_label == "unconfigured"
+        assert "AttributeError" in one.fault
+        one.trigger_configure()
+        assert one.state_label == "unconfigured"
+    finally:
+        one.destroy_node()

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> None:
         args.out,
         args.surfaces,
     )
-    scenario.check_effects()
+    scenario.check_simulation()
     inputs, logs = options.inputs_of([], args.aircraft), [f"{node}.log" for node in NODES]
     with output_folder(args.out, "loop", inputs=inputs, force=args.force, working=logs) as out:
         flight = _fly(scenario)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError
 
 #: Servos of an aircraft whose file states none.
 ACTUATORS = "actuator_lag:time_constant=0.05"
@@ -44,11 +45,14 @@ class LoopScenario:
         """The simulator's effects from ``ONSET`` on."""
         return " ".join(part for part in (self.effects, self.fail) if part)
 
-    def check_effects(self) -> None:
-        """Raise InputError on effects that the simulator would refuse half a minute later."""
+    def check_simulation(self) -> None:
+        """Raise InputError on turbulence that the simulator would refuse, and on effects, half a minute later."""
         from sysid_node.sim import Simulator  # noqa: PLC0415  # JAX takes its time
         from sysid_node.sim.flying import live  # noqa: PLC0415  # JAX takes its time
+        from sysid_node.sim.signals.dryden import INTENSITIES  # noqa: PLC0415  # JAX takes its time
 
+        if self.turbulence not in INTENSITIES:
+            raise InputError(f"turbulence {self.turbulence!r}: expected one of {', '.join(INTENSITIES)}")
         live.vector(Simulator(self.aircraft), self.effects_after_failure.split())
 
     def arguments(self, node: str) -> list[str]:

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
-from sysid_node.flight.frames import BODY_FRAMES
-from sysid_node.parameter import NodeParameter, check_each
+from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, check_each
 from sysid_node.view.live import LiveScene
 from sysid_node.view.markers import SAME, Trail, Triangles, fixed_parts, moving_parts, pose_of
 from sysid_node.view.scene import GREY, ORANGE, PALE, VERMILION, Body, Colour
@@ -30,16 +29,8 @@ _TEXT_ABOVE = 0.6  # height of the text above the aircraft, spans
 _LETTERS, _LINE = 0.15, 0.01  # height of a letter and width of the trail, spans
 
 PARAMETERS = (
-    NodeParameter(
-        "aircraft",
-        "",
-        "",
-        "The aircraft: a name in config/aircraft, e.g. cdrw, or the path of an aircraft file. Needed.",
-        "For every aircraft.",
-    ),
-    NodeParameter(
-        "body_frame", "flu", "", "Axes of the IMU's messages.", "To frd for PX4's axes.", choices=BODY_FRAMES
-    ),
+    AIRCRAFT,
+    BODY_FRAME,
     NodeParameter("world_frame", "map", "", "The fixed frame, east-north-up.", "To the fixed frame of the display."),
     NodeParameter("aircraft_frame", "base_link", "", "The aircraft's frame, forward-left-up.", "To the name it has."),
     NodeParameter(

@@ -7,8 +7,9 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
@@ -16,11 +17,24 @@ from sysid_node.cli.live.processes import started
 from sysid_node.errors import InputError
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.interruption import on_interrupt
+from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, check_each
 from sysid_node.view.live import LiveScene
 from sysid_node.view.recording import append, check_recording, open_file, open_window, require_rerun, say
 
 if TYPE_CHECKING:
     from sysid_node.ros.support.flight_watch import FlightWatch
+
+PARAMETERS = (
+    AIRCRAFT,
+    BODY_FRAME,
+    NodeParameter(
+        "save",
+        "",
+        "",
+        "The file to write (.rrd), without a window; empty: a window.",
+        "Where there is no screen, or to look again later.",
+    ),
+)
 
 #: What ``--view`` stands for without a file: a window.
 WINDOW = Path("-")
@@ -100,29 +114,29 @@ def viewer_beside(aircraft: str, wanted: Path | None, folder: Path) -> Iterator[
 
 
 def main() -> None:
-    """Entry point of ``ros2 run sysid_node view``: its parameters are ``aircraft``, ``save`` and ``body_frame``."""
+    """Entry point of ``ros2 run sysid_node view``."""
     import sysid_node.ros  # noqa: F401, PLC0415  # finds sysid_msgs in a virtual environment
-    from sysid_node.ros.support.spin import run_program  # noqa: PLC0415
+    from sysid_node.ros.support.spin import help_text, run_program  # noqa: PLC0415
 
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        print(help_text("view", __doc__ or "", PARAMETERS))
+        return
     sys.exit(run_program(_serve))
 
 
 def _serve() -> None:
+    from sysid_node.ros.support.declaring import declare, values_of  # noqa: PLC0415
     from sysid_node.ros.support.flight_watch import FlightWatch  # noqa: PLC0415
 
     require_rerun()
     os.nice(_NICE)
     watch = FlightWatch()
     try:
-        given = {
-            name: str(watch.node.declare_parameter(name, default).value)
-            for name, default in (("aircraft", ""), ("save", ""), ("body_frame", "flu"))
-        }
+        declare(watch.node, PARAMETERS, partial(check_each, PARAMETERS))
+        given = values_of(watch.node, PARAMETERS)
         if not given["aircraft"]:
             raise InputError("parameter aircraft is empty: give a name or a file, e.g. --ros-args -p aircraft:=cdrw")
-        if given["body_frame"] not in ("flu", "frd"):
-            raise InputError(f"parameter body_frame: {given['body_frame']!r}; expected flu or frd")
-        watch.frame = cast("BodyFrame", given["body_frame"])
+        watch.frame = given["body_frame"]
         scene = LiveScene(load_aircraft(given["aircraft"]))
         _show(scene, watch, _opened(scene, Path(given["save"]) if given["save"] else None))
     finally:

@@ -9,7 +9,7 @@ from typing import Any
 
 from sysid_node.flight.cdr.message_reader import Text
 from sysid_node.flight.checks import LATEST_STAMP_NS
-from sysid_node.flight.frames import tilt_from_quaternion
+from sysid_node.flight.frames import BodyFrame, tilt_from_quaternion
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
 Numbers = tuple[Any, ...]
@@ -41,18 +41,19 @@ ATTITUDE_PATHS: Paths = (
 _COVARIANCE = 9  # numbers in a covariance matrix
 
 
-def imu(numbers: Numbers, sign: float) -> tuple[int, tuple[float, ...]]:
-    """Stamp (ns), specific force (m/s^2) and rates (rad/s), FRD; ``sign`` is -1 for messages in FLU axes, 1 in FRD."""
+def imu(numbers: Numbers, frame: BodyFrame) -> tuple[int, tuple[float, ...]]:
+    """Stamp (ns), specific force (m/s^2) and rates (rad/s), FRD, of a message in the axes of a ``frame``."""
     seconds, nanoseconds, p, q, r, x, y, z = numbers
+    sign = 1.0 if frame == "frd" else -1.0
     return seconds * 1_000_000_000 + nanoseconds, (x, sign * y, sign * z, p, sign * q, sign * r)
 
 
-def imu_and_attitude(numbers: Numbers) -> tuple[int, tuple[float, ...], tuple[float, float]]:
-    """As ``imu`` for FLU axes, and roll and pitch (rad), NaN without orientation; of ``ATTITUDE_PATHS``."""
+def imu_and_attitude(numbers: Numbers, frame: BodyFrame) -> tuple[int, tuple[float, ...], tuple[float, float]]:
+    """As ``imu``, and roll and pitch (rad), NaN without orientation; of ``ATTITUDE_PATHS``."""
     x, y, z, w, covariance = numbers[2:7]
     measured = covariance >= 0.0  # REP-145: -1 where there is no orientation
-    tilt = tilt_from_quaternion((x, y, z, w), "flu") if measured else (math.nan, math.nan)
-    return *imu((*numbers[:2], *numbers[6 + _COVARIANCE :]), -1.0), tilt
+    tilt = tilt_from_quaternion((x, y, z, w), frame) if measured else (math.nan, math.nan)
+    return *imu((*numbers[:2], *numbers[6 + _COVARIANCE :]), frame), tilt
 
 
 def air_data(numbers: Numbers) -> tuple[int, tuple[float, ...]]:

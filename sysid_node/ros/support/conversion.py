@@ -36,11 +36,6 @@ def header(nanoseconds: int, frame_id: str) -> Header:
     return Header(stamp=stamp_message(nanoseconds), frame_id=frame_id)
 
 
-def axes_sign(body_frame: str) -> float:
-    """The factor of y and z in the conversion from ``body_frame`` (flu or frd) to FRD."""
-    return 1.0 if body_frame == "frd" else -1.0
-
-
 def gap_message(gaps: Sequence[CoefficientGap], servos: Sequence[ServoGap], header: Header, aircraft: str) -> ModelGap:
     """The message of the gaps of all coefficients and servos."""
     return ModelGap(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -57,9 +58,9 @@ class FlightWatch:
         self._executor.add_node(self.node)
 
     def listen(self, seconds: float) -> None:
-        """Receive messages for so many seconds."""
-        end = self.node.get_clock().now().nanoseconds + round(seconds * NANOSECONDS)
-        while (left := (end - self.node.get_clock().now().nanoseconds) / NANOSECONDS) > 0.0 and rclpy.ok():
+        """Receive messages for so many seconds of a clock that never jumps, whatever the time of /clock."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0 and rclpy.ok():
             self._executor.spin_once(timeout_sec=left)
 
     def take(self) -> tuple[FlightNews, list[Estimates]]:

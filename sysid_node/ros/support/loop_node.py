@@ -47,14 +47,6 @@ SET_POINT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 #: The last message is kept for those who subscribe later.
 LAST_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
-#: The parameter that all nodes of the loop have.
-AIRCRAFT = NodeParameter(
-    "aircraft",
-    "",
-    "",
-    "The aircraft: a name in config/aircraft, e.g. cdrw, or the path of an aircraft file. Needed.",
-    "For every aircraft.",
-)
 #: The parameter of the nodes that model the surfaces.
 LAG = ("actuator_lag", "s", "First-order lag of the surfaces behind their commands.", "For every aircraft.")
 UNHEARD = 2.0  # s without a message, after which a node says so in its log
@@ -70,6 +62,7 @@ class LoopNode(Node, ABC):
         self.present: Mapping[str, str] = {}  # the conditions that were found last
         self._needed: set[str] = set()  # topics without which the node cannot do its work
         self._left_out: Counter[tuple[str, str]] = Counter()  # since the last report, by resolved topic and reason
+        self._foreign = ""  # the aircraft whose estimates came since the last report, where it is another one
         self._conditions, self._states = Conditions(), ReportedStates()
         self._table, self._live = table, live
         declare(self, table, lambda values: check_each(table, values))
@@ -146,6 +139,12 @@ class LoopNode(Node, ABC):
         if needed:
             self._needed.add(topic)
 
+    def is_ours(self, message: Any) -> bool:
+        """Whether estimates are of this node's aircraft; those of another one are to be left out, and are reported."""
+        ours: bool = message.aircraft == self.aircraft.name
+        self._foreign = self._foreign if ours else message.aircraft
+        return ours
+
     def every(self, period: float, callback: Any) -> None:
         """Call back every ``period`` s of a clock that never jumps."""
         self.create_timer(period, while_ros_is_up(self, callback), clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -165,12 +164,13 @@ class LoopNode(Node, ABC):
         silent = self._silent()
         left_out = {name: f"{count} messages are {why}" for (name, why), count in self._left_out.items()}
         self._left_out.clear()
-        self.present = self.conditions()
+        foreign = self._foreign_estimates()
+        self.present = {**self.conditions(), **foreign}
         say(self, self._conditions.update({**silent, **left_out, **self.present}))
         for line in self._states.update(self.states()):
             self.get_logger().warning(line)
         level, line, values = self.words()
-        missing = [f"{name}: {text}" for name, text in {**silent, **left_out}.items() if name not in line]
+        missing = [f"{name}: {text}" for name, text in {**silent, **left_out, **foreign}.items() if name not in line]
         pairs = [KeyValue(key=k, value=f"{v:.6g}" if isinstance(v, float) else str(v)) for k, v in values.items()]
         status = DiagnosticStatus(
             level=max(level, DiagnosticStatus.WARN) if missing else level,
@@ -182,6 +182,14 @@ class LoopNode(Node, ABC):
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
+
+    def _foreign_estimates(self) -> dict[str, str]:
+        """The topic of estimates with what is wrong with it, where they were of another aircraft."""
+        foreign, self._foreign = self._foreign, ""
+        if not foreign:
+            return {}
+        words = f"of aircraft {foreign!r}, left out: this node's is {self.aircraft.name!r}"
+        return {self.inputs[DERIVATIVES].name: words}
 
     def _silent(self) -> dict[str, str]:
         """The needed topics without a message for ``UNHEARD`` s, by resolved name."""

@@ -23,9 +23,9 @@ from sysid_node.flight.frames import quaternion_from_euler
 from sysid_node.flight.live.arrivals import LATE
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.parameter import NodeParameter
+from sysid_node.parameter import AIRCRAFT, NodeParameter
 from sysid_node.ros.support.conversion import NANOSECONDS, header, stamp_message
-from sysid_node.ros.support.loop_node import AIRCRAFT, COMMAND, LATEST, LoopNode
+from sysid_node.ros.support.loop_node import COMMAND, LATEST, LoopNode
 from sysid_node.sim import EFFECTS, Simulator, trim_flight
 from sysid_node.sim.flying import live
 from sysid_node.sim.flying.live import LiveConditions, LiveReading
@@ -40,7 +40,8 @@ PARAMETERS = (
         "",
         "What makes the aircraft differ from its file: name:key=value, several with a space between. Change in flight. "
         "It replaces what the file states of the same; the default does not where the file states actuator_lag.",
-        "To let something fail: control_effectiveness_loss:elevator=0.6 (docs: Effects).",
+        "To let something fail, add it to the others: actuator_lag:time_constant=0.05 "
+        "control_effectiveness_loss:elevator=0.6 (docs: Effects).",
     ),
     NodeParameter(
         "rate",

@@ -12,7 +12,7 @@ from sysid_msgs.msg import AirData
 from sysid_node.flight.cdr.message_reader import MessageReader
 from sysid_node.flight.live import messages
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
-from sysid_node.ros.support.conversion import axes_sign, stamp_message
+from sysid_node.ros.support.conversion import stamp_message
 from sysid_node.ros.support.message_types import fields_of
 
 STAMP = 1_700_000_000_123_456_789
@@ -32,17 +32,16 @@ def test_imu(frame: str) -> None:
     )
     numbers, texts = read(IMU, message)
     assert texts == (frame,)
-    assert messages.imu(numbers, -1.0) == (STAMP, (1.0, -2.0, -3.0, 0.1, 0.2, 0.3))
-    assert messages.imu(numbers, 1.0) == (STAMP, (1.0, 2.0, 3.0, 0.1, -0.2, -0.3))
+    assert messages.imu(numbers, "flu") == (STAMP, (1.0, -2.0, -3.0, 0.1, 0.2, 0.3))
+    assert messages.imu(numbers, "frd") == (STAMP, (1.0, 2.0, 3.0, 0.1, -0.2, -0.3))
 
 
 def test_level_flight_in_either_frame() -> None:
     """At rest an accelerometer reads +g upwards: (0, 0, 9.8) FLU, (0, 0, -9.8) FRD (REP-103). Nose up: q > 0 in FRD."""
     flu = Imu(linear_acceleration=Vector3(z=9.8), angular_velocity=Vector3(x=0.1, y=-0.2, z=-0.3))
     frd = Imu(linear_acceleration=Vector3(z=-9.8), angular_velocity=Vector3(x=0.1, y=0.2, z=0.3))
-    for message, body_frame in ((flu, "flu"), (frd, "frd")):
-        found = messages.imu(read(IMU, message)[0], axes_sign(body_frame))
-        assert found == (0, (0.0, 0.0, -9.8, 0.1, 0.2, 0.3))
+    assert messages.imu(read(IMU, flu)[0], "flu") == (0, (0.0, 0.0, -9.8, 0.1, 0.2, 0.3))
+    assert messages.imu(read(IMU, frd)[0], "frd") == (0, (0.0, 0.0, -9.8, 0.1, 0.2, 0.3))
 
 
 @pytest.mark.parametrize("frame", FRAMES)
@@ -55,12 +54,25 @@ def test_attitude(frame: str) -> None:
         angular_velocity=Vector3(x=0.1),
     )
     reader = MessageReader(fields_of, INPUT_TOPICS[IMU], *messages.ATTITUDE_PATHS)
-    stamp, values, (roll, pitch) = messages.imu_and_attitude(reader.read(serialize_message(message))[0])
+    stamp, values, (roll, pitch) = messages.imu_and_attitude(reader.read(serialize_message(message))[0], "flu")
     assert (stamp, values) == (STAMP, (0.0, 0.0, -9.8, 0.1, 0.0, 0.0))
     assert (roll, pitch) == pytest.approx((0.0, 0.2), abs=1e-12)
     message.orientation_covariance[0] = -1.0
-    *_, attitude = messages.imu_and_attitude(reader.read(serialize_message(message))[0])
+    *_, attitude = messages.imu_and_attitude(reader.read(serialize_message(message))[0], "flu")
     assert all(map(math.isnan, attitude))
+
+
+def test_attitude_of_a_driver_in_forward_right_down_axes() -> None:
+    """Nose up by 0.2 rad is a turn by 0.2 about the right wing, against north-east-down; at rest it reads -g along z."""
+    message = Imu(
+        orientation=Quaternion(y=math.sin(0.1), w=math.cos(0.1)),
+        linear_acceleration=Vector3(z=-9.8),
+        angular_velocity=Vector3(y=0.2, z=0.3),
+    )
+    reader = MessageReader(fields_of, INPUT_TOPICS[IMU], *messages.ATTITUDE_PATHS)
+    _, values, (roll, pitch) = messages.imu_and_attitude(reader.read(serialize_message(message))[0], "frd")
+    assert values == (0.0, 0.0, -9.8, 0.0, 0.2, 0.3)
+    assert (roll, pitch) == pytest.approx((0.0, 0.2), abs=1e-12)
 
 
 @pytest.mark.parametrize("frame", FRAMES)
