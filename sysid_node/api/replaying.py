@@ -23,6 +23,7 @@ from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import counts_by_reason, joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.logs.opening import carried_by
+from sysid_node.flight.mean_force import MeanForce
 from sysid_node.flight.pieces import PIECE, FlightPiece, FlightPieces, flight_pieces
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import ImuStream, Stamps, Streams
@@ -34,7 +35,7 @@ from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_
 from sysid_node.online.estimates.log import EstimatesLog
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.types import Estimates
+from sysid_node.online.types import AZ, Estimates
 from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.files.runs.estimates_bag import write_estimates
 from sysid_node.report.files.runs.run_folder import REPORT, write_run
@@ -174,7 +175,7 @@ class _Run:
         self.history, self.stamps = EstimatesLog(), array("q")
         self.samples = RecordedSamples(aircraft, flight.imu_messages)
         self.flow = flow_angle_filter.init(as_estimated(aircraft))
-        self.attitudes = _Attitudes()
+        self.attitudes, self.force = _Attitudes(), MeanForce()
         self.spans: dict[str, tuple[float, float]] = {}  # s, by topic
         self.joints: tuple[str, ...] = ()
         self.commands_from, self.frame_id = math.inf, ""
@@ -192,6 +193,9 @@ class _Run:
         self.spans = joined_spans(self.spans, stamp_spans(streams))
         count = sum(len(stream.arrival) for stream in streams.by_topic.values())
         aligned, known = self.alignment.take(streams, last=piece.last), len(self.stamps)
+        self.force.add(aligned.time, aligned.samples[:, AZ])
+        if piece.last:
+            self.force.check(self.flight.name)
         self._identify(aligned, count)
         self._keep(aligned, streams)
         if self.monitor is not None:

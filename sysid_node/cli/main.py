@@ -201,7 +201,7 @@ def _show_warning(command: str, usual: Callable[..., None], later: list[str]) ->
     def show(message: Warning | str, category: type[Warning], *place: object) -> None:
         line = f"sysid {command}: warning: {' '.join(str(message).split())}"
         if issubclass(category, InputWarning):
-            later.append(line)
+            later.extend({line} - {*later})
         elif issubclass(category, ModelWarning):
             print(line, file=sys.stderr)
         else:

@@ -13,7 +13,6 @@ from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.excited_axes import quiet_motions
 from sysid_node.gap.residuals.residual_model import CHANNELS, COEFFICIENTS
-from sysid_node.gap.selection.calibration import calibrated_probability
 from sysid_node.gap.selection.causes import Cause, variance_by_alternatives
 from sysid_node.gap.short_flights.readings import length_of
 from sysid_node.gap.validation.spectral_error import Gap
@@ -84,9 +83,7 @@ def ranked(found: Diagnosis) -> list[tuple[str, float | None, float]]:
     effects = {each.added.label: each.added.effect for each in attribution.first_stage if each.added}
     weighed = (*attribution.doubted, *attribution.causes)
     as_alternative = {
-        effect: share * calibrated_probability(cause.evidence)
-        for cause in weighed
-        for effect, share in cause.alternatives
+        effect: share * cause.probability_of_any for cause in weighed for effect, share in cause.alternatives
     }
     as_cause = {cause.candidate.label: cause.probability for cause in weighed}
     return [

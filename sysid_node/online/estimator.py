@@ -147,7 +147,9 @@ def _imperfections(
 def _tell_reconstructed_angles(state: EstimatorState) -> None:
     """Take the imperfections as they are where the first sample has shown that flow angles are reconstructed."""
     model, missing = state.model, state.flow.missing
-    if model.imperfections is None or missing is None or model.imperfections.reconstructed == missing:
+    if state.flow.model is None or missing is None:
+        return  # nothing is reconstructed
+    if model.imperfections is None or model.imperfections.reconstructed == missing:
         return
     sample = model.sample
     found = _imperfections(

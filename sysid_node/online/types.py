@@ -12,6 +12,7 @@ from typing import NamedTuple
 #: air density kg/m^3, thrust N (NaN = not measured), and the time between the two air-data messages that the
 #: sample lies between, s: the flow angles' noise density is their variance times it. Body axes FRD.
 SAMPLE_COLUMNS = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "thrust", "air_interval")
+AZ = SAMPLE_COLUMNS.index("az")  # place of the specific force along z in a sample
 
 
 class DerivativeEstimate(NamedTuple):

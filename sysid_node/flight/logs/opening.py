@@ -25,6 +25,7 @@ from sysid_node.flight.logs.readers.telemetry import read_telemetry
 from sysid_node.flight.logs.readers.ulog import read_ulog
 from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.flight.logs.tables import with_commands
+from sysid_node.flight.mean_force import checked_force
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.streams import COMMAND_FRACTIONS, COMMANDS, Streams, in_order_of_logging
 from sysid_node.flight.topics import topic_names
@@ -107,9 +108,9 @@ def load_flight_record(
     ``carried``: what the actuators' messages, or a table's columns, are ("commands", "positions", or "auto").
     """
     if is_table(path):
-        return with_commands(aircraft, read_csv(path), carried)
+        return with_commands(aircraft, checked_force(read_csv(path)), carried)
     streams = open_streams(path, aircraft, topics, frame)
-    return flight_record(aircraft, streams, max_gap, carried_by(streams, carried))
+    return checked_force(flight_record(aircraft, streams, max_gap, carried_by(streams, carried)))
 
 
 def is_table(path: str | Path) -> bool:

@@ -42,6 +42,11 @@ def upper_factor(information: Array) -> Array:
 
 
 def solve(information: Array, right: Array) -> Array:
-    """``information^-1 right`` (K, ...), of a symmetric positive definite matrix (K, K)."""
+    """``information^-1 right`` (K, ...), of a symmetric positive definite matrix (K, K).
+
+    Raises LinAlgError where one of them is not finite, as where a prediction has diverged.
+    """
+    if not (np.isfinite(information).all() and np.isfinite(right).all()):
+        raise np.linalg.LinAlgError("the information is not finite")
     solved: Array = cho_solve(cho_factor(information), right)
     return solved

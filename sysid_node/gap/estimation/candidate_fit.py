@@ -172,6 +172,15 @@ class CandidateFit:
         places = self.derivative_places
         return -0.5 * float(np.sum((now[places] / spread[places]) ** 2)) - self.log_widening
 
+    @property
+    def uncertain_log_widening(self) -> float:
+        """The part of ``log_widening`` by the priors of unknowns that count as uncertain, nats."""
+        if not self.widened:
+            return 0.0
+        nuisances, first = self.nuisances, len(self.indices)
+        chosen = np.isin(nuisances.indices, self.widened) & self.uncertain[first + nuisances.places(0)]
+        return float(np.log(nuisances.factors[chosen]).sum())
+
     def noise_pull_on(self, indices: Sequence[int]) -> Array:
         """Pull (unknowns,) that corrects for the noise of the regressors, see ``spectral_weights.noise_pull``.
 

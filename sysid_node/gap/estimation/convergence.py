@@ -41,12 +41,14 @@ def converged(fit: CandidateFit, rounds: int = _ROUNDS) -> CandidateFit:
         raw = ((flight, (np.abs(left) ** 2).mean(axis=0)) for flight, left in pairs)
         deviance = sum(spectral_deviance(flight.model, power, flight.point) for flight, power in raw)
         deviance -= 2.0 * fit.prior_score
-        if not deviance >= least:
+        if deviance < least:
             best, least = fit, deviance
         if not abs(deviance - last) >= _CONVERGED:
             break
         near = problem if abs(deviance - last) < _NEAR else None
         last = deviance
+    if not np.isfinite(least):
+        raise np.linalg.LinAlgError("the prediction diverges")
     return linearised(best)
 
 

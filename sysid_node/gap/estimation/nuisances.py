@@ -60,6 +60,7 @@ class Nuisances:
     shared: NDArray[np.bool_]  # whether all flights have the same value
     widened: float = 0.0  # sum of the logarithms by which priors are wider than the file's tolerances
     factors: Array = field(default_factory=lambda: np.empty(0))  # by which each prior is widened; empty: the same
+    wide: frozenset[int] = frozenset()  # entries whose priors are widened already
 
     def without(self, effects: frozenset[str], names: tuple[str, ...], widened: tuple[int, ...] = ()) -> Nuisances:
         """The nuisances without those that these effects replace; the priors of ``widened`` entries are widened."""
@@ -67,11 +68,12 @@ class Nuisances:
         gone |= {clock for clock, same in CLOCKS.items() if not effects.isdisjoint(same)}
         keep = np.array([names[i].partition(".")[0] not in gone for i in self.indices], bool)
         factors = self.factors if self.factors.size else np.full(len(self.indices), THRESHOLDS.priors.widening)
-        wide = np.where(np.isin(self.indices, widened), factors, 1.0)
+        new = [i for i in widened if i not in self.wide]
+        wide = np.where(np.isin(self.indices, new), factors, 1.0)
         indices = tuple(i for i, k in zip(self.indices, keep, strict=True) if k)
         more = self.widened + float(np.log(wide[keep]).sum())
         sigma, limit = (self.sigma * wide)[keep], (self.limit * wide)[keep]
-        return Nuisances(indices, sigma, limit, self.shared[keep], more, factors[keep])
+        return Nuisances(indices, sigma, limit, self.shared[keep], more, factors[keep], self.wide.union(new))
 
     def places(self, flight: int) -> NDArray[np.intp]:
         """Places of one flight's nuisance parameters among those of all flights, the shared ones first."""

@@ -111,7 +111,8 @@ def whole_flight_evidence(fit: CandidateFit) -> Evidence:
         for f, residual in zip(fit.flights, residuals, strict=True)
     )
     count = sum(len(flight.points) for flight in flights)
-    total = -0.5 * deviance + fit.prior_score - 0.5 * float(after - before)
+    prior_score = fit.prior_score + fit.uncertain_log_widening  # ``before`` has the width of these priors already
+    total = -0.5 * deviance + prior_score - 0.5 * float(after - before)
     return Evidence(np.full(count, total / count), flights)
 
 

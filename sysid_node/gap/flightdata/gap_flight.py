@@ -16,6 +16,7 @@ from sysid_node.flight.align import flight_record
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs.opening import is_table, open_streams
+from sysid_node.flight.mean_force import checked_force
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import Streams
 from sysid_node.gap.flightdata.flow_angles import FilterHistory, missing_flow_angles, run_flow_angle_filter
@@ -63,7 +64,7 @@ class GapFlight:
 def load_gap_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None, frame: BodyFrame) -> GapFlight:
     """The flight of a bag or a log. Raises InputError where it is unreadable, lacks a signal or is too short."""
     if is_table(path):
-        record = read_csv(path)
+        record = checked_force(read_csv(path))
         rate = 1.0 / float(np.median(np.diff(record.time)))
         return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
     return flight_of_streams(open_streams(path, aircraft, topics, frame), aircraft, str(path))
@@ -73,7 +74,7 @@ def flight_of_streams(streams: Streams, aircraft: Aircraft, source: str = "") ->
     """The flight of recorded messages. Raises InputError where it lacks a signal or is too short."""
     Actuation.of(aircraft).require(streams.actuators.names, streams.name)
     # commands are held, but the servos are the simulator's own
-    record = flight_record(aircraft, streams, 0.2, "auto", servos=False)
+    record = checked_force(flight_record(aircraft, streams, 0.2, "auto", servos=False))
     rates = [1e9 / float(np.median(np.diff(s.arrival.stamp_ns))) for s in streams.by_topic.values()]
     flight = GapFlight(record, rates[0], rates[1], rates[2], source=source)
     return completed_flight(aircraft, replace(flight, command_interval=streams.actuators.interval))

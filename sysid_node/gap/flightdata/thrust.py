@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.dynamics.tables import array_tables, mach_number, need_mach
 from sysid_node.flight.record import Array, FlightRecord
 
 #: What contains no information then: a channel of forces, and readings of short simulated flights.
@@ -30,8 +31,9 @@ def with_inferred_thrust(aircraft: Aircraft, record: FlightRecord) -> FlightReco
     and the flow as at the probe; the error of that is small in the forward direction.
     """
     x, alpha = _regressors(aircraft, record), record["alpha"]
-    lift = _by_file(aircraft, "CL", x)
-    drag = _by_file(aircraft, "CD", {**x, "k": lift**2})
+    tabulated = _by_tables(aircraft, record, x)
+    lift = _by_file(aircraft, "CL", x) + tabulated.get("CL", 0.0)
+    drag = _by_file(aircraft, "CD", {**x, "k": lift**2}) + tabulated.get("CD", 0.0)
     pressure = 0.5 * record["rho"] * record["V"] ** 2 * aircraft.geometry.S
     aerodynamic = pressure * (lift * np.sin(alpha) - drag * np.cos(alpha))
     along = math.cos(aircraft.throttle.inclination if aircraft.throttle else 0.0)
@@ -51,3 +53,13 @@ def _by_file(aircraft: Aircraft, coefficient: str, x: dict[str, Array]) -> Array
     """A coefficient (N,) by the aircraft file's derivatives."""
     terms = {n.partition("_")[2]: d.value for n, d in aircraft.derivatives.items() if n.startswith(f"{coefficient}_")}
     return np.asarray(sum((value * x[regressor] for regressor, value in terms.items()), np.zeros_like(x["0"])))
+
+
+def _by_tables(aircraft: Aircraft, record: FlightRecord, x: dict[str, Array]) -> dict[str, Array]:
+    """What the aircraft file's tables add to lift and drag, (N,) each; those over the throttle are left out."""
+    of_forces = [table for table in aircraft.tables if table.coefficient in {"CL", "CD"}]
+    tables = [table for table in of_forces if "throttle" not in table.over]
+    if not tables:
+        return {}
+    mach = {"Mach": mach_number(record["V"], record["rho"], np)} if need_mach(tables) else {}
+    return array_tables(tables)({**x, "V": record["V"], **mach})

@@ -78,12 +78,12 @@ def is_supported_but_misspecified(evidence: CauseEvidence, thresholds: Threshold
     return is_misspecified(evidence, thresholds) and likely
 
 
-def regressors(evidence: CauseEvidence) -> tuple[float, float, float]:
+def regressors(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> tuple[float, float, float]:
     """Regressors (3,) of the logistic regression: one, log of the log Bayes factor (at least 1 nat), flexibility.
 
     The log Bayes factor is that of as much excited flight as the weights were learned from.
     """
-    scaled = evidence.log_bayes_factor * THRESHOLDS.calibration.windows / evidence.windows
+    scaled = evidence.log_bayes_factor * thresholds.calibration.windows / evidence.windows
     return 1.0, float(np.log(max(scaled, 1.0))), float(evidence.flexible)
 
 
@@ -95,7 +95,7 @@ def prior_odds(effect: str, thresholds: Thresholds = THRESHOLDS) -> float:
 
 def probability_by_support(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> float:
     """The larger of the logistic regression's probability and that by the tolerances, whatever the misfit."""
-    log_odds = float(np.dot(thresholds.calibration.weights, regressors(evidence)))
+    log_odds = float(np.dot(thresholds.calibration.weights, regressors(evidence, thresholds)))
     by_tolerances = evidence.by_tolerances - float(np.log(evidence.searched))
     if evidence.by_tolerances > 0.0:
         log_odds = max(log_odds, by_tolerances + thresholds.calibration.flexible * evidence.flexible)

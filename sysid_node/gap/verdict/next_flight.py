@@ -192,6 +192,8 @@ def _separation(
     free = [*added, *(i for i in fit.nuisances.indices if i not in entries)]
     slopes = real_rows(model.slopes(instead, free), weight).reshape(response.size, -1)
     known = dict(zip(fit.nuisances.indices, fit.nuisances.sigma, strict=True))
+    own = dict(zip(alternative.nuisances.indices, alternative.nuisances.sigma, strict=True))
+    known |= {i: own[i] for i in alternative.widened}
     sigma = np.array([*prior(model.simulator, added)[1], *(known[i] for i in free[len(added) :])])
     matrix = np.vstack([slopes, np.diag(1.0 / sigma)])
     target = np.concatenate([response, np.zeros(sigma.size)])

@@ -210,7 +210,7 @@ def _begin(filter_: FlowAngleFilter, model: FlowAngleModel, time: float, sample:
     ax, ay, az, _, _, r, V = sample[:7]
     alpha = max(min(reference_angles(model, sample, 0.0, (0.0, 0.0, 0.0))[0], 0.3), -0.3)
     climb = max(min((ax * math.cos(alpha) + az * math.sin(alpha)) / GRAVITY, 0.5), -0.5)
-    bank = math.atan2(V * r - ay, GRAVITY)
+    bank = math.asin(max(min((V * r - ay) / GRAVITY, 0.9), -0.9))
     filter_.state = [
         *velocity_of((V, alpha, 0.0), scalar),
         bank,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -73,6 +74,8 @@ def _begin_anew(state: EstimatorState, lines: Array, since: float) -> Steps[None
     segment.noise_moments = segment.noise_moments * share
     state.finished.information = no_information(state)
     state.finished.in_window.clear()
+    faded = math.exp(0.5 * state.model.spectrum.rate * (segment.start - since))  # they count from the new start
+    segment.first_impulses = segment.first_impulses * faded
     segment.start_at(since, state.model.spectrum.omega)
     segment.first_servos = None  # what was before is taken out with the servos as they were
     sampled_transform.take_out(state.transform, before)

@@ -84,8 +84,10 @@ def finished_information(state: EstimatorState) -> Information:
     if rate and finished.information.samples:
         finished.information = finished.information.scaled(math.exp(-rate * (now - finished.time)))
     finished.time = now
-    if window and finished.in_window and finished.in_window[0][0] <= now - window:
+    left = len(finished.in_window)
+    while window and finished.in_window and finished.in_window[0][0] <= now - window:
         finished.in_window.popleft()
+    if len(finished.in_window) < left:
         finished.information = sum((info for _, info in finished.in_window), no_information(state))
     return finished.information
 

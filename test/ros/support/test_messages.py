@@ -63,7 +63,7 @@ def test_attitude(frame: str) -> None:
 
 
 def test_attitude_of_a_driver_in_forward_right_down_axes() -> None:
-    """Nose up by 0.2 rad is a turn by 0.2 about the right wing, against north-east-down; at rest it reads -g along z."""
+    """Nose up by 0.2 rad is a turn by 0.2 about the right wing (of NED); at rest it reads -g along z."""
     message = Imu(
         orientation=Quaternion(y=math.sin(0.1), w=math.cos(0.1)),
         linear_acceleration=Vector3(z=-9.8),
