@@ -14,7 +14,7 @@ TIME = np.arange(0.0, 10.0, 0.01)
 
 def record(mean: float, seconds: float = 10.0) -> FlightRecord:
     """Level flight with a manoeuvre of half a g."""
-    time = TIME[TIME < seconds]
+    time = TIME[seconds > TIME]
     return FlightRecord(time, {"az": mean * (1.0 + 0.5 * np.sin(2.0 * time))}, "made")
 
 

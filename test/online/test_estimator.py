@@ -188,6 +188,28 @@ def test_what_was_flown_long_ago_is_forgotten(settings: OnlineSettings) -> None:
     assert len(state.finished.in_window) <= 6
 
 
+def test_a_window_holds_no_more_than_its_length_after_an_interruption() -> None:
+    """All segments from before an interruption longer than the window are left behind at once."""
+    time = np.arange(0.0, 45.0, 0.02)
+    late = np.where(time > 40.0, time + 100.0, time)
+    state = estimator.init(AIRCRAFT, OnlineSettings(window=20.0, detect_changes=False))
+    for t, sample in zip(late.tolist(), exact_flight(AIRCRAFT, time).tolist(), strict=True):
+        estimator.update(state, t, sample)
+        if state.latest is not None and t > 142.0:
+            assert state.latest.total.energy < t - 140.0 + 1.0
+
+
+def test_an_angle_that_cannot_be_reconstructed_is_reported() -> None:
+    """Without vanes, and without the lift slope by which the file would tell the angle of attack."""
+    known = {name: d for name, d in AIRCRAFT.derivatives.items() if name != "CL_alpha"}
+    samples = SAMPLES.copy()
+    samples[:, [SAMPLE_COLUMNS.index("alpha"), SAMPLE_COLUMNS.index("beta")]] = math.nan
+    state = estimator.init(replace(AIRCRAFT, derivatives=known), OnlineSettings())
+    for time, sample in zip(TIME.tolist(), samples.tolist(), strict=True):
+        estimator.update(state, time, sample)
+    assert {d.status for d in estimate(state).derivatives.values()} == {"alpha not measured"}
+
+
 def test_memory_does_not_grow() -> None:
     """Containers after two minutes are no longer than after one."""
     time = np.arange(0.0, 120.0, 0.05)

@@ -16,6 +16,7 @@ from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.flight.logs.checks.survey import LogSurvey, survey
 from sysid_node.flight.logs.rates import rate_text
+from sysid_node.flight.topics import topic_names
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -26,17 +27,18 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser = commands.add_parser("check", help="say what a flight's file is good for", description=__doc__)
     parser.add_argument("logs", metavar="LOG", type=Path, nargs="+", help=options.LOG_HELP)
     parser.add_argument("--aircraft", metavar="FILE|NAME", help="say what the commands do with this aircraft file")
+    options.add_topics(parser)
     return parser
 
 
 def run(args: argparse.Namespace) -> None:
     """Prints a table for each log. Raises InputError after the last where one could not be read."""
     aircraft = load_aircraft(args.aircraft) if args.aircraft else None
-    unread = []
+    topics, frame, unread = topic_names(args.topic), args.body_frame, []
     for path in args.logs:
         try:
-            found = survey(path, aircraft)
-            refused = refusals_told(found) if aircraft is None else refusals_tried(path, aircraft)
+            found = survey(path, aircraft, topics, frame)
+            refused = refusals_told(found) if aircraft is None else refusals_tried(path, aircraft, topics, frame)
             _show(found, verdicts(found, refused, aircraft_known=aircraft is not None))
         except InputError as error:
             unread.append(str(error))

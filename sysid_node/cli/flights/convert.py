@@ -17,7 +17,6 @@ from sysid_node.flight.autopilots.recorded import read_recorded
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import STORAGES, write_streams
 from sysid_node.flight.csv import read_csv
-from sysid_node.flight.frames import BODY_FRAMES
 from sysid_node.flight.logs.content import Content, content_of
 from sysid_node.flight.logs.fractions import joints_of_fractions
 from sysid_node.flight.logs.log_streams import LogFlight
@@ -25,6 +24,7 @@ from sysid_node.flight.logs.opening import open_log
 from sysid_node.flight.logs.rates import rates_of_streams
 from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.flight.streams import COMMAND_FRACTIONS
+from sysid_node.flight.topics import topic_names
 from sysid_node.report.files.outputs.output_file import output_bag
 
 if TYPE_CHECKING:
@@ -51,10 +51,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
         "--air-data-delay", type=float, default=AdapterSettings.air_data_delay, help="of a bag: s (default: 0)"
     )
     parser.add_argument("--storage", choices=list(STORAGES), default="mcap", help="default: mcap")
-    parser.add_argument(
-        "--body-frame", choices=BODY_FRAMES, default="flu", help="of the IMU messages (default: flu, REP-103)"
-    )
-    parser.add_argument("--quiet", action="store_true", help="print nothing")
+    options.add_reading(parser)
     return parser
 
 
@@ -95,7 +92,7 @@ def _opened(args: argparse.Namespace, aircraft: Aircraft | None) -> LogFlight:
     if content is Content.TABLE:
         return LogFlight(streams_from_record(read_csv(args.log), aircraft), ())
     outputs = args.joints or (aircraft.outputs if aircraft is not None else "")
-    flight = open_log(args.log, settings, outputs)
+    flight = None if args.topic else open_log(args.log, settings, outputs)
     if flight is None and args.joints:
         raise InputError(f"{args.log}: --joints is for a log or a bag of an autopilot")
-    return flight or LogFlight(read_streams(args.log, frame=args.body_frame), ())
+    return flight or LogFlight(read_streams(args.log, topic_names(args.topic), args.body_frame), ())

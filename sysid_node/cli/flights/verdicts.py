@@ -14,6 +14,7 @@ from sysid_node.errors import InputError, InputWarning
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import joined_spans, stamp_spans, why_nothing_aligned
+from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs.checks.survey import FULL_DEFLECTION, OUTPUTS, LogSurvey
 from sysid_node.flight.logs.opening import carried_by, load_flight_record
 from sysid_node.flight.mean_force import MeanForce
@@ -36,6 +37,7 @@ _ANGLES = {"alpha": "the angle of attack", "beta": "the sideslip"}
 #: (``batch.identify``, which takes long to load).
 _WITHOUT_VANES = ("output_error", "filter_error", "*_kalman_filter")
 
+_Topics = Mapping[str, str] | None
 Refusals = Mapping[str, str]  # command -> why it does not take the flight; empty where it does
 
 
@@ -54,13 +56,18 @@ def _too_short(seconds: float) -> str:
     return f"{seconds:.1f} s of flight without an interruption; the gap needs {SHORTEST_FOR_GAP:g} s or more"
 
 
-def refusals_tried(path: Path, aircraft: Aircraft) -> dict[str, str]:
-    """What the commands refuse for an aircraft: each one's own reader is asked."""
-    replay = _refusal(path, lambda: _replayed(path, aircraft))
+def refusals_tried(
+    path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None = None, frame: BodyFrame = "flu"
+) -> dict[str, str]:
+    """What the commands refuse for an aircraft: each one's own reader is asked.
+
+    ``topics`` and ``frame`` are for bags of our own topics, as of ``open_streams``.
+    """
+    replay = _refusal(path, lambda: _replayed(path, aircraft, topics, frame))
     return {
         "replay": replay,
-        "identify": _refusal(path, lambda: _identified(path, aircraft)),
-        "gap": _refusal(path, lambda: _diagnosed(path, aircraft)),
+        "identify": _refusal(path, lambda: _identified(path, aircraft, topics, frame)),
+        "gap": _refusal(path, lambda: _diagnosed(path, aircraft, topics, frame)),
         "faults": replay,
     }
 
@@ -83,10 +90,10 @@ def _refusal(path: Path, read: Callable[[], object]) -> str:
     return ""
 
 
-def _replayed(path: Path, aircraft: Aircraft) -> None:
-    """Read a flight as ``sysid replay`` does, until the first samples. Raises InputError where there are none."""
+def _replayed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame) -> None:
+    """Read a flight as ``sysid replay`` does. Raises InputError where there are no samples."""
     max_gap, setting = OnlineSettings().max_gap, OnlineSettings().actuators
-    with flight_pieces(path, aircraft) as flight:
+    with flight_pieces(path, aircraft, topics, frame) as flight:
         alignment = None
         spans: dict[str, tuple[float, float]] = {}
         names: tuple[str, ...] = ()
@@ -103,19 +110,19 @@ def _replayed(path: Path, aircraft: Aircraft) -> None:
         raise InputError(why_nothing_aligned(flight.name, spans, alignment.rejected if alignment else {}))
 
 
-def _identified(path: Path, aircraft: Aircraft) -> None:
+def _identified(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame) -> None:
     """Read a flight as ``sysid identify`` does. Flow angles need not be measured, as not all methods need them."""
     from sysid_node.batch.regression.measured_coefficients import measured_coefficients  # noqa: PLC0415  # JAX
 
-    record = load_flight_record(path, aircraft, carried="auto")
+    record = load_flight_record(path, aircraft, topics=topics, frame=frame, carried="auto")
     unmeasured = {name: np.zeros(len(record)) for name in _ANGLES if not record.measured(name)}
     measured_coefficients(aircraft, replace(record, columns={**record.columns, **unmeasured}))
 
 
-def _diagnosed(path: Path, aircraft: Aircraft) -> None:
+def _diagnosed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame) -> None:
     from sysid_node.gap.flightdata.gap_flight import load_gap_flight  # noqa: PLC0415  # JAX takes its time
 
-    load_gap_flight(path, aircraft, None, "flu")
+    load_gap_flight(path, aircraft, topics, frame)
 
 
 def verdicts(found: LogSurvey, refused: Refusals, *, aircraft_known: bool) -> dict[str, str]:

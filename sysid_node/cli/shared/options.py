@@ -42,11 +42,16 @@ def add_settings(parser: argparse.ArgumentParser, meaning: str, lines_of: str) -
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
-    """How a bag is read, ``--topic`` and ``--body-frame``, and ``--quiet``."""
+    """How a bag is read, and ``--quiet``."""
+    add_topics(parser)
+    add_quiet(parser)
+
+
+def add_topics(parser: argparse.ArgumentParser) -> None:
+    """How a bag is read: ``--topic`` and ``--body-frame``."""
     add = parser.add_argument
     add("--topic", action="append", default=[], metavar="OURS:=THEIRS", help="a topic's name in the bag")
     add("--body-frame", choices=BODY_FRAMES, default="flu", help="axes of the IMU messages (default: flu)")
-    add_quiet(parser)
 
 
 def add_view(parser: argparse.ArgumentParser) -> None:

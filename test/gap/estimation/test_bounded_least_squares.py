@@ -39,6 +39,12 @@ def test_information_that_rounding_makes_singular_has_a_factor() -> None:
     np.testing.assert_array_equal(upper_factor(clear), np.linalg.cholesky(clear).T)
 
 
+def test_what_is_not_finite_is_an_error_of_linear_algebra() -> None:
+    for information, right in ((np.full((2, 2), np.nan), np.ones(2)), (np.eye(2), np.array([1.0, np.inf]))):
+        with pytest.raises(np.linalg.LinAlgError, match="not finite"):
+            solve(information, right)
+
+
 def test_solve_is_numpys(random: np.random.Generator) -> None:
     root, right = np.eye(4) + 0.3 * random.standard_normal((4, 4)), random.standard_normal((4, 2))
     np.testing.assert_allclose(solve(root.T @ root, right), np.linalg.solve(root.T @ root, right))

@@ -48,6 +48,15 @@ def test_a_wider_prior_has_its_price(shifted) -> None:
     assert wide.widened == pytest.approx(moved.sum() * np.log(5.0))
 
 
+def test_a_prior_is_widened_once(shifted) -> None:
+    names = shifted.simulator.names
+    own = tuple(i for i, name in enumerate(names) if name.startswith("derivative_error.Cm_"))
+    once = shifted.nuisances.without(frozenset({"derivative_error"}), names, own)
+    again = once.without(frozenset({"derivative_error", "actuator_lag"}), names, own)
+    np.testing.assert_array_equal(again.sigma, once.sigma)
+    assert again.widened == once.widened
+
+
 def test_a_delay_that_is_blamed_is_no_nuisance(shifted) -> None:
     names = shifted.simulator.names
     kept = shifted.nuisances.without(frozenset({"command_delay"}), names)

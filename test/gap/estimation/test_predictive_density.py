@@ -6,7 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sysid_node.gap.estimation.candidate_fit import unfitted
+from sysid_node.gap.estimation.candidate_fit import unfitted, with_candidates
+from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
 from sysid_node.gap.estimation.predictive_density import (
@@ -91,3 +92,16 @@ def test_the_noise_of_a_flight_not_fitted_is_estimated_by_channel() -> None:
     assert np.delete(levels, 3) == pytest.approx(1.0, abs=0.15)
     known = noise_levels(rows.reshape(4, -1), slopes.reshape(4, -1, 1), np.array([[1e9]]), np.zeros(12))
     assert known[7] > 500.0  # an unknown that the fit knows does not move
+
+
+def test_a_prior_that_a_candidate_widens_is_as_one_that_the_file_states(plain_model) -> None:
+    """Truth: the evidence of a flight is the same where the file states tolerances of that width."""
+    simulator = plain_model.simulator
+    nuisances = nuisances_of(simulator.aircraft, plain_model)
+    whole = next(c for c in candidates_of(simulator, [plain_model]) if c.label == "derivative_error of Cm")
+    blamed = converged(with_candidates(unfitted([plain_model], nuisances), [whole], nuisances, ()), rounds=1)
+    assert blamed.uncertain.all()
+    stated = replace(blamed.nuisances, widened=0.0)
+    filed = replace(blamed, candidates=(), flights=tuple(replace(f, nuisances=stated) for f in blamed.flights))
+    evidence = [whole_flight_evidence(fit).total for fit in (blamed, filed)]
+    assert evidence[0] == pytest.approx(evidence[1] - whole.log_choices, abs=1e-6)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sysid_node.aircraft.model import LookupTable
 from sysid_node.errors import InputError
 from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
@@ -46,3 +47,14 @@ def test_a_thrust_with_holes_is_refused(aircraft, plain) -> None:
     holed = replace(plain.record, columns={**plain.record.columns, "thrust": thrust})
     with pytest.raises(InputError, match="no complete thrust"):
         completed_flight(aircraft, replace(plain, record=holed))
+
+
+def test_drag_in_a_table_counts_as_drag_in_a_derivative(aircraft, plain) -> None:
+    """Truth: a table that adds the same at every angle is a constant."""
+    drag = aircraft.derivatives["CD_0"]
+    table = LookupTable("CD", ("alpha",), ((-1.0, 1.0),), (drag.value, drag.value))
+    tabulated = replace(
+        aircraft, derivatives={**aircraft.derivatives, "CD_0": replace(drag, value=0.0)}, tables=(table,)
+    )
+    found, same = (without_thrust(one, plain).record["thrust"] for one in (tabulated, aircraft))
+    np.testing.assert_allclose(found, same, atol=1e-9)

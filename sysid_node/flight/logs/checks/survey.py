@@ -13,6 +13,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import STEP_BACK_NS
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.csv import read_csv
+from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, AutopilotLog, Signal
 from sysid_node.flight.logs.autopilot_log import IMU as IMU_ROLE
 from sysid_node.flight.logs.checks.excitation import excitation
@@ -33,7 +34,7 @@ from sysid_node.flight.logs.rates import SampleRate, rate_of, rates_of_log, rate
 from sysid_node.flight.logs.record_streams import incomplete_streams, missing_columns
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.streams import COMMAND_FRACTIONS, Streams
-from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, topic_names
 
 #: A gap is a step between samples of more than this many usual ones, and of more than 0.1 s.
 _GAP_STEPS, _GAP = 3.0, 0.1
@@ -122,18 +123,27 @@ class _Signals:
         }
 
 
-def survey(path: str | Path, aircraft: Aircraft | None = None) -> LogSurvey:
-    """What a flight's file holds, for an ``aircraft`` where it is given. Raises InputError where it cannot be read."""
+def survey(
+    path: str | Path,
+    aircraft: Aircraft | None = None,
+    topics: Mapping[str, str] | None = None,
+    frame: BodyFrame = "flu",
+) -> LogSurvey:
+    """What a flight's file holds, for an ``aircraft`` where it is given. Raises InputError where it cannot be read.
+
+    ``topics`` and ``frame`` are for bags of our own topics, as of ``open_streams``.
+    """
     path = Path(path)
-    log = read_autopilot_log(path)
+    remapped = topics is not None and dict(topics) != topic_names()
+    log = None if remapped else read_autopilot_log(path)
     if log is not None:
         return _surveyed(path.name, log.autopilot, _of_log(log, aircraft), aircraft)
-    if is_table(path):
+    if not remapped and is_table(path):
         record = read_csv(path)
         found = _of_streams(incomplete_streams(record), None)  # whose joints are the controls
         found = replace(found, incomplete=missing_columns(record), gap_lacks=_not_whole(record))
     else:
-        found = _of_streams(read_streams(path), aircraft)
+        found = _of_streams(read_streams(path, topics, frame), aircraft)
     return _surveyed(path.name, content_of(path).value, found, aircraft)
 
 
