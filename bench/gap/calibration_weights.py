@@ -81,7 +81,7 @@ def page(cases: Sequence[str], X: Array, right: Array, refuted: Sequence[bool]) 
     return "\n\n".join(
         [
             f"{len(set(cases))} cases with {len(right)} causes named or doubted, {int(right.sum())} of them there; "
-            f"beside them {len(refuted)} whose law is refuted by what they leave, {sum(refuted)} of them there.",
+            f"beside them {len(refuted)} whose equation is misspecified, {sum(refuted)} of them there.",
             table(("weight of", "learned", "in use"), rows),
             "Each case by weights learned from all the others:",
             calibration(stated),

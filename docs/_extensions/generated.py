@@ -57,7 +57,7 @@ def commands() -> str:
         "# Commands\n",
         "This page is made from the argument parsers: `sysid COMMAND --help` prints the same. Every command ends with "
         "exit code 0 when it is done, 2 when the input is wrong (one line says what, where, and what to do), and 1 for "
-        "anything else. `--debug` adds the traceback of an error.\n",
+        "any other error; 130 and 143 after Ctrl-C and SIGTERM. `--debug` adds the traceback of an error.\n",
     ]
     for name in main.COMMANDS:
         parts += _command(name, _subparser(main.build_parser(name), name), main.COMMANDS[name].meaning)

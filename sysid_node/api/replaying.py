@@ -22,8 +22,8 @@ from sysid_node.faults.settings import FaultMonitorSettings as FaultSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import counts_by_reason, joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.commanded import carried_in_words
+from sysid_node.flight.live.mean_force import MeanForce
 from sysid_node.flight.logs.opening import carried_by
-from sysid_node.flight.mean_force import MeanForce
 from sysid_node.flight.pieces import PIECE, FlightPiece, FlightPieces, flight_pieces
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import ImuStream, Stamps, Streams

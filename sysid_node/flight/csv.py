@@ -36,6 +36,8 @@ def read_csv(path: str | Path) -> FlightRecord:
     with _naming(path), _lines(path) as lines:
         reader = csv.reader(lines)
         names = [name.strip() for name in next(reader, [])]
+        if not names:
+            raise InputError(f"is empty: no column {TIME!r}, and no other")
         check_names(names, TIME)
         table = np.array([_numbers(names, reader.line_num, row) for row in reader if row])
         if len(table) < 2:
@@ -72,7 +74,9 @@ def _naming(path: Path) -> Iterator[None]:
             yield
     except FileNotFoundError:
         raise InputError(f"{path}: does not exist") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: cannot be read as CSV: no text in UTF-8; save it in UTF-8") from None
+    except (OSError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as CSV: {error}") from error
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None

@@ -10,8 +10,8 @@ from typing import NamedTuple
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import counts_by_reason
 from sysid_node.flight.commanded import carried_in_words
+from sysid_node.flight.live.mean_force import RecentMeanForce
 from sysid_node.flight.live.monitor import Durations
-from sysid_node.flight.mean_force import RecentMeanForce
 from sysid_node.online import estimator
 from sysid_node.online.alignment import schedule, streaming
 from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_covariance

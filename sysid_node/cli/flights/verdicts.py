@@ -15,9 +15,9 @@ from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.frames import BodyFrame
+from sysid_node.flight.live.mean_force import MeanForce
 from sysid_node.flight.logs.checks.survey import FULL_DEFLECTION, OUTPUTS, LogSurvey
 from sysid_node.flight.logs.opening import carried_by, load_flight_record
-from sysid_node.flight.mean_force import MeanForce
 from sysid_node.flight.pieces import flight_pieces
 from sysid_node.online.alignment.in_pieces import PieceAlignment
 from sysid_node.online.settings import OnlineSettings

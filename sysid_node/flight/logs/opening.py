@@ -13,6 +13,7 @@ from sysid_node.flight.bag.reader import open_bag, read_streams, reading
 from sysid_node.flight.commands import JointMessage, read_commands
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
+from sysid_node.flight.live.mean_force import checked_force
 from sysid_node.flight.logs.autopilot_log import AutopilotLog
 from sysid_node.flight.logs.checks.refusals import refusal_of_log, refusal_of_streams, require
 from sysid_node.flight.logs.content import Content, content_of
@@ -25,7 +26,6 @@ from sysid_node.flight.logs.readers.telemetry import read_telemetry
 from sysid_node.flight.logs.readers.ulog import read_ulog
 from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.flight.logs.tables import with_commands
-from sysid_node.flight.mean_force import checked_force
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.streams import COMMAND_FRACTIONS, COMMANDS, Streams, in_order_of_logging
 from sysid_node.flight.topics import topic_names

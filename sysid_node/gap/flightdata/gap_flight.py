@@ -15,8 +15,8 @@ from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import flight_record
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
+from sysid_node.flight.live.mean_force import checked_force
 from sysid_node.flight.logs.opening import is_table, open_streams
-from sysid_node.flight.mean_force import checked_force
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import Streams
 from sysid_node.gap.flightdata.flow_angles import FilterHistory, missing_flow_angles, run_flow_angle_filter

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sysid_node.errors import InputError, InputWarning
-from sysid_node.flight.mean_force import AVERAGED, MeanForce, RecentMeanForce, checked_force, fault_of
+from sysid_node.flight.live.mean_force import AVERAGED, MeanForce, RecentMeanForce, checked_force, fault_of
 from sysid_node.flight.record import FlightRecord
 
 TIME = np.arange(0.0, 10.0, 0.01)
