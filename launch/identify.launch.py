@@ -15,7 +15,7 @@ from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import LifecycleNode, Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-DEFAULTS = Path(get_package_share_directory("sysid_node"), "config", "identifier.yaml")
+CONFIG = Path(get_package_share_directory("sysid_node"), "config")
 TOPICS = {"imu": "imu/data", "air_data": "air_data", "actuators": "actuators"}
 
 
@@ -23,7 +23,9 @@ def arguments() -> list[DeclareLaunchArgument]:
     """What may be given on the command line."""
     return [
         DeclareLaunchArgument("aircraft", description="a name in config/aircraft, or an aircraft file"),
-        DeclareLaunchArgument("parameters", default_value=str(DEFAULTS), description="parameter file"),
+        DeclareLaunchArgument(
+            "parameters", default_value=str(CONFIG / "identifier.yaml"), description="the identifier's parameter file"
+        ),
         DeclareLaunchArgument("namespace", default_value="", description="namespace of nodes and topics"),
         DeclareLaunchArgument(
             "use_sim_time",
@@ -36,6 +38,11 @@ def arguments() -> list[DeclareLaunchArgument]:
             default_value="",
             description="whose topics the adapter translates; empty: no adapter",
             choices=["", "px4", "mavros", "rosflight"],
+        ),
+        DeclareLaunchArgument(
+            "adapter_parameters",
+            default_value=str(CONFIG / "adapter.yaml"),
+            description="the adapter's parameter file, as for the air's temperature and the delay of the air data",
         ),
         DeclareLaunchArgument(
             "joints", default_value="", description="of the adapter: NAME=OUTPUT:TRIM:SCALE with spaces between"
@@ -73,7 +80,7 @@ def generate_launch_description() -> LaunchDescription:
                 executable="adapter",
                 name="adapter",
                 namespace=argument("namespace"),
-                parameters=[{"autopilot": autopilot, "joints": joints, **simulated}],
+                parameters=[argument("adapter_parameters"), {"autopilot": autopilot, "joints": joints, **simulated}],
                 output="screen",
                 condition=IfCondition(PythonExpression(["'", argument("autopilot"), "' != ''"])),
                 on_exit=Shutdown(reason="adapter has ended"),

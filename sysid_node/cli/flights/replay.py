@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,10 +11,15 @@ from sysid_node.api.flight_file import load
 from sysid_node.api.replaying import replay
 from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar, show_estimates, show_faults
+from sysid_node.errors import InputError, InputWarning
+from sysid_node.flight.frames import BODY_FRAMES, BodyFrame
 from sysid_node.report.files.outputs.output_folder import output_folder
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+
+#: The node's parameters that matter in flight alone.
+_IN_FLIGHT = frozenset({"stale_after", "save_directory", "autostart"})
 
 
 def add_parser(commands: Commands) -> argparse.ArgumentParser:
@@ -30,8 +36,9 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> None:
     """Replays the bag and writes the results."""
-    flight = load(args.bag, args.aircraft, topics=args.topic, body_frame=args.body_frame)
     settings = options.settings_of(args.set, args.frequencies, "window=20")
+    frame = _of_reading(settings, args.body_frame)
+    flight = load(args.bag, args.aircraft, topics=args.topic, body_frame=frame)
     inputs = options.inputs_of([args.bag], args.aircraft)
     with output_folder(args.out, "replay", inputs=inputs, force=args.force) as out:
         with progress_bar(f"replay {args.bag.name}", quiet=args.quiet) as progress:
@@ -42,3 +49,21 @@ def run(args: argparse.Namespace) -> None:
         if found.faults:
             show_faults(found.faults)
         print(args.out / "report.html")
+
+
+def _of_reading(settings: dict[str, object], body_frame: BodyFrame) -> BodyFrame:
+    """The IMU's axes; takes from the settings those parameters of the node that are none of the estimator's.
+
+    Raises InputError where one is wrong, and warns (InputWarning) where one changes nothing in a replay.
+    """
+    if "aircraft" in settings:
+        raise InputError("--set aircraft: give it as --aircraft")
+    given = settings.pop("body_frame", body_frame)
+    frame = next((known for known in BODY_FRAMES if known == given), None)
+    if frame is None:
+        raise InputError(f"setting body_frame = {given!r}: expected {' or '.join(BODY_FRAMES)}")
+    for name in _IN_FLIGHT & settings.keys():
+        warnings.warn(
+            f"setting {name} = {settings.pop(name)!r} changes nothing in a replay", InputWarning, stacklevel=2
+        )
+    return frame

@@ -329,6 +329,20 @@ def test_settings_from_texts():
         replay_settings(settings_of(["="], None, "window=20"))
 
 
+def test_every_parameter_of_the_node_is_taken(arguments, tmp_path, capsys):
+    """Axes as by the option, what matters in flight alone with a warning, and one line where a value is wrong."""
+    assert main([*arguments, "--quiet", "--set", "body_frame=flu", "--set", "stale_after=2"]) == 0
+    assert "setting stale_after = '2' changes nothing in a replay" in line_of_warning(capsys)
+    for given, said in (("body_frame=ned", "expected flu or frd"), ("aircraft=cdrw", "give it as --aircraft")):
+        assert said in line_of(capsys, [*arguments, "--set", given])
+
+
+def line_of_warning(capsys):
+    """The one line on stderr."""
+    (line,) = capsys.readouterr().err.splitlines()
+    return line
+
+
 def test_faulty_messages_are_counted_in_the_summary(arguments, tmp_path, flight):
     values = flight.air_data.values.copy()
     values[100:103, 0] = np.nan
