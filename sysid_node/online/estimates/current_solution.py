@@ -12,7 +12,7 @@ from sysid_node.online.frequency.regression_signals import OFFSET
 from sysid_node.online.regression import least_squares
 from sysid_node.online.regression.information import edges, products
 from sysid_node.online.regression.least_squares import Solution
-from sysid_node.online.regression.mixed_estimation import weighed
+from sysid_node.online.regression.mixed_estimation import gained, weighed
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.state import EstimatorState, SegmentSolution, current_lines
 
@@ -48,10 +48,9 @@ def current_solution(state: EstimatorState) -> CurrentSolution | None:
     solution = least_squares.solve(equations, gram, None if noise is None else noise * growth)
     size = np.abs(solution.inverse.diagonal())
     slopes = solution.theta.T
+    variances = slope_variances(latest, solution.residual, size, growth)
     if state.model.settings.use_prior:
-        slopes, variances = _with_prior(state, latest, slopes)
-    else:
-        variances = slope_variances(latest, solution.residual, size, growth)
+        slopes, variances = _with_prior(state, latest, slopes, variances)
     C, P = slopes.shape
     numbers = np.empty((2, C, P + 1))  # values and variances of the slopes and, behind them, of the offsets
     numbers[0, :, :P], numbers[1, :, :P] = slopes, variances
@@ -81,11 +80,32 @@ def growth_since(latest: SegmentSolution, time: float) -> float:
     return (energy + (time - latest.time)) / max(energy, 1e-9)
 
 
-def _with_prior(state: EstimatorState, latest: SegmentSolution, slopes: Array) -> tuple[Array, Array]:
-    """(C, P) the ``slopes`` weighed with the aircraft file's derivatives, and (C, P) their variances."""
-    covariance = latest.uncertainty.covariance
-    values, spread = weighed(state.equations.structure, slopes.T, covariance, *state.model.prior)
-    return values.T, spread.diagonal(axis1=1, axis2=2)
+def _with_prior(state: EstimatorState, latest: SegmentSolution, slopes: Array, variances: Array) -> tuple[Array, Array]:
+    """(C, P) the ``slopes`` weighed with the aircraft file's derivatives, and (C, P) their ``variances``.
+
+    What is weighed has the statistical and the systematic error. The systematic part is published as it was, so that
+    the variances hold what the prior leaves beyond it, and at least the share of chance.
+    """
+    structure, (expected, precision) = state.equations.structure, state.model.prior
+    P, found = slopes.shape[1], latest.systematic
+    correction, systematic = np.zeros_like(slopes), np.zeros((*slopes.shape, P))
+    if found is not None:
+        jacobian = found.considered.jacobian[:, :, :P]
+        correction = found.correction[:, :P]
+        systematic = np.einsum("ncp,nm,mcq->cpq", jacobian, found.considered.covariance, jacobian)
+    chance = _with_diagonal(latest.uncertainty.covariance, variances)
+    values, spread = weighed(structure, (slopes + correction).T, chance + systematic, expected, precision)
+    gain = structure.unit + (chance + systematic) * precision.T[:, None]
+    left = gained(gain, gained(gain, chance).swapaxes(1, 2))
+    beyond, least = (each.diagonal(axis1=1, axis2=2) for each in (spread - systematic, left))
+    return values.T - correction, np.maximum(beyond, least)
+
+
+def _with_diagonal(covariance: Array, variances: Array) -> Array:
+    """A covariance (C, P, P) with the same correlations and other ``variances`` (C, P)."""
+    before = covariance.diagonal(axis1=1, axis2=2)
+    scale = np.sqrt(np.divide(variances, before, out=np.zeros_like(variances), where=before > 0.0))
+    return np.asarray(covariance * scale[:, :, None] * scale[:, None, :])
 
 
 def _offsets(

@@ -1,17 +1,22 @@
 """Beliefs weighed with the flight: the product of two normal densities."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from plant import TRUTH, exact_flight, made_aircraft
 
+from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Derivative
+from sysid_node.flight.bag.reader import read_streams
+from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.regression.mixed_estimation import believed_derivatives, gained, weighed
 from sysid_node.online.regression.normal_equations import model_structure
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 
+ROOT = Path(__file__).resolve().parents[3]
 AIRCRAFT = made_aircraft()
 STRUCTURE = model_structure(AIRCRAFT.model_structure)
 
@@ -78,3 +83,19 @@ def test_a_gain_that_rounding_made_singular_leaves_finite_numbers() -> None:
     gain = covariance + np.eye(2)
     assert np.linalg.matrix_rank(gain[0]) == 1
     assert np.abs(gained(gain, covariance)).max() < 2.0
+
+
+def test_exact_beliefs_stand_whatever_else_is_corrected() -> None:
+    """The bundled flight, whose clocks and instruments are corrected for; truth: it was flown with the file's values."""
+    aircraft = load_aircraft("cdrw")
+    exact = {name: replace(d, tolerance=1e-6 * abs(d.value) + 1e-9) for name, d in aircraft.derivatives.items()}
+    known = replace(aircraft, derivatives=exact)
+    flight = align_streams(known, read_streams(ROOT / "bags" / "cdrw_multistep"), 0.2)
+    time, samples = flight.time[:4000], flight.samples[:4000]
+    found = run(known, OnlineSettings(use_prior=True), time, samples, time[-1:])[0].derivatives
+    moved = run(aircraft, OnlineSettings(), time, samples, time[-1:])[0].derivatives
+    slopes = [name for name in exact if not name.endswith("_0")]
+    for name in slopes:
+        assert found[name].value == pytest.approx(exact[name].value, rel=1e-3), name
+        assert found[name].standard_error >= 0.9 * found[name].systematic_error
+    assert max(abs(moved[name].value / exact[name].value - 1.0) for name in slopes) > 0.02
