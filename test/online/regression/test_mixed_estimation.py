@@ -86,7 +86,7 @@ def test_a_gain_that_rounding_made_singular_leaves_finite_numbers() -> None:
 
 
 def test_exact_beliefs_stand_whatever_else_is_corrected() -> None:
-    """The bundled flight, whose clocks and instruments are corrected for; truth: it was flown with the file's values."""
+    """The bundled flight, whose clocks and instruments are corrected for. Truth: the values it was flown with."""
     aircraft = load_aircraft("cdrw")
     exact = {name: replace(d, tolerance=1e-6 * abs(d.value) + 1e-9) for name, d in aircraft.derivatives.items()}
     known = replace(aircraft, derivatives=exact)
