@@ -46,7 +46,7 @@ from sysid_node.online.status import vocabulary
 from sysid_node.online.systematic.imperfections import Imperfections, imperfections
 from sysid_node.online.systematic.rate_limited_moves import RateLimitedMoves
 from sysid_node.online.systematic.servo_states import ServoStates
-from sysid_node.online.types import SAMPLE_COLUMNS
+from sysid_node.online.types import AZ, SAMPLE_COLUMNS
 
 Array = NDArray[np.float64]
 DRIFT = OUTPUTS + NUISANCES.index("t")
@@ -170,6 +170,7 @@ def begin_with_commands(state: EstimatorState, time: float) -> EstimatorState:
     if fresh.controls.states is not None:
         fresh.inputs.begin = max(state.inputs.begin, time + SERVOS_SETTLE)
     fresh.inputs.thrust_known, fresh.inputs.incomplete = state.inputs.thrust_known, state.inputs.incomplete
+    fresh.inputs.force = state.inputs.force
     return fresh
 
 
@@ -213,6 +214,7 @@ def update(state: EstimatorState, time: float, sample: Sequence[float]) -> None:
 def _append(state: EstimatorState, time: float, sample: Sequence[float], excess: Sequence[float]) -> None:
     """Append a complete sample to the transform; after a gap, begin a segment with it."""
     model, inputs, previous = state.model, state.inputs, state.inputs.previous
+    inputs.force.add(time, sample[AZ])
     row, angles = model.sample.signals(sample)
     row.insert(DRIFT, time)
     motion = (*sample[3:6], *angles)

@@ -10,7 +10,6 @@ from typing import NamedTuple
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import counts_by_reason
 from sysid_node.flight.commanded import carried_in_words
-from sysid_node.flight.live.mean_force import RecentMeanForce
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.online import estimator
 from sysid_node.online.alignment import schedule, streaming
@@ -20,7 +19,7 @@ from sysid_node.online.estimates.model_gap import CoefficientGap, model_gap
 from sysid_node.online.estimates.published import estimate_of
 from sysid_node.online.estimates.servo_gap import ServoGap, servo_gaps, servo_times_in_file
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.types import AZ, Estimates
+from sysid_node.online.types import Estimates
 
 BUSY = 0.4  # share of the time between estimates in which nothing long is begun before the next
 
@@ -50,7 +49,6 @@ class Session:
         self.intake = streaming.init(self.aircraft, self.settings.max_gap, self.settings.actuators)
         self.schedule = schedule.Schedule(self.publish_rate)
         self.samples = 0
-        self.force = RecentMeanForce()
         self._correlated: object = None  # the slowly changing quantities whose covariance was asked for last
         self._heard = time.monotonic()
         self._published = -math.inf  # s, time.perf_counter when estimates last fell due
@@ -70,6 +68,11 @@ class Session:
     def rejected(self) -> dict[str, int]:
         """Messages left out: ``"<topic>: <reason>"`` -> count."""
         return counts_by_reason(self.intake.rejected)
+
+    @property
+    def force_fault(self) -> str:
+        """What is wrong with the mean specific force of the last seconds, in words; empty where nothing is."""
+        return self.state.inputs.force.fault
 
     @property
     def silence(self) -> float:
@@ -136,7 +139,6 @@ class Session:
             estimator.update(self.state, moment, sample)
             self.update_times.add(time.perf_counter() - start)
             self.samples += 1
-            self.force.add(moment, sample[AZ])
             self._heard = time.monotonic()
             if schedule.due(self.schedule, moment, wait):
                 results.append(self.now())

@@ -238,7 +238,7 @@ class Identifier(CarefulNode):
         )
         monitors, rejected = list(self._monitors.values()), session.rejected
         recent = self._recent.update(monitors, rejected)
-        message.status.append(source.input(monitors, rejected, stale_after, recent, session.force.fault))
+        message.status.append(source.input(monitors, rejected, stale_after, recent, session.force_fault))
         self._warn(session, monitors, recent)
         if not session.samples:
             message.status += [source.waits("estimate"), source.waits("computation")]
@@ -273,8 +273,8 @@ class Identifier(CarefulNode):
         missing = [joint for joint in joints if joint not in self._joints]
         if missing and here in present and self._joints:
             present[here] += f"; expected joints {', '.join(joints)}, got {', '.join(self._joints)}"
-        if session.force.fault:
-            present["accelerometer"] = session.force.fault
+        if session.force_fault:
+            present["accelerometer"] = session.force_fault
         if session.samples and lag_level(self._lag) != DiagnosticStatus.OK:
             present["estimates"] = lag_words(self._lag)
         say(self, self._conditions.update(present))

@@ -143,6 +143,8 @@ def judge(state: EstimatorState, latest: SegmentSolution, current: CurrentSoluti
         good &= ~poor.take(table.coefficient)
     bad = ~good
     codes: Codes = bad * _reasons(state, basis, current, bad, inflation, buried, poor)
+    if state.inputs.force.fault:
+        codes[:] = status.OUTSIDE
     if current.time - state.changes.changed_at < SETTLING:
         codes[:] = status.CHANGED
     if now - current.time > STALE:
