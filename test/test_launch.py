@@ -116,7 +116,7 @@ def test_values_have_the_types_of_the_nodes_tables(actions: list[Kept]) -> None:
 
 ARGUMENTS = {
     "identify.launch.py": {
-        *("aircraft", "parameters", "namespace", "use_sim_time", "autopilot", "joints"),
+        *("aircraft", "parameters", "namespace", "use_sim_time", "autopilot", "adapter_parameters", "joints"),
         *("imu", "air_data", "actuators"),
     },
     "closed_loop.launch.py": {
@@ -166,3 +166,11 @@ def test_the_adapter_is_started_where_an_autopilot_is_named(actions: list[Kept])
     condition = adapter.given["condition"].words[0]
     assert value(condition, {"autopilot": "px4"})
     assert not value(condition, {"autopilot": ""})
+
+
+@pytest.mark.parametrize("actions", [ROOT / "launch" / "closed_loop.launch.py"], indirect=True)
+@pytest.mark.parametrize(("surfaces", "carried"), [("measured", "positions"), ("commanded", "commands")])
+def test_the_identifier_is_told_what_the_actuators_carry(actions: list[Kept], surfaces: str, carried: str) -> None:
+    (identifier,) = [one for one in actions if one.kind == "LifecycleNode"]
+    given = identifier.given["parameters"][-1]["actuators"]
+    assert value(given.words[0], {"surfaces": surfaces}) == carried
