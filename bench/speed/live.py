@@ -158,11 +158,12 @@ def listen(node, flight: BaseProcess, pid: int, bare: bool) -> tuple[list[tuple[
         node.create_subscription(DerivativeEstimates, "/identifier/derivatives", on_estimates, 100),
         node.create_subscription(DiagnosticArray, "/diagnostics", on_diagnostics, 10),
     )
-    while not all(subscription.get_publisher_count() for subscription in heard[: 1 if bare else 2]):
-        time.sleep(0.05)  # what is published before this program is known to the node would not reach it
-    flight.start()
     executor = SingleThreadedExecutor()  # the events executor gives callbacks no message info
     executor.add_node(node)
+    # what is published before this program is known to the node would not reach it
+    while not all(subscription.get_publisher_count() for subscription in heard[: 1 if bare else 2]):
+        executor.spin_once(timeout_sec=0.05)
+    flight.start()
     while flight.is_alive():
         executor.spin_once(timeout_sec=0.2)
     share = (processor_seconds(pid) - used) / (time.monotonic() - began)
