@@ -130,3 +130,4 @@ def serve(node: Node) -> None:
         # (as in ros2/rclpy issue 1644); what is left to collect ends with the process.
         gc.disable()
         node.destroy_node()
+        gc.freeze()  # the collection at the end of the process leaves them out, too
