@@ -81,10 +81,11 @@ def growth_since(latest: SegmentSolution, time: float) -> float:
 
 
 def _with_prior(state: EstimatorState, latest: SegmentSolution, slopes: Array, variances: Array) -> tuple[Array, Array]:
-    """(C, P) the ``slopes`` weighed with the aircraft file's derivatives, and (C, P) their ``variances``.
+    """(C, P) the ``slopes`` combined with the aircraft file's derivatives, and (C, P) their statistical variances.
 
-    What is weighed has the statistical and the systematic error. The systematic part is published as it was, so that
-    the variances hold what the prior leaves beyond it, and at least the share of chance.
+    The corrected slopes are combined, with the sum K of their statistical and systematic covariances. The systematic
+    variance is published as it is without the prior. The statistical variance is therefore the larger of two: the
+    posterior variance less the systematic one, and what the weighting leaves of the statistical ``variances`` (C, P).
     """
     structure, (expected, precision) = state.equations.structure, state.model.prior
     P, found = slopes.shape[1], latest.systematic
@@ -93,12 +94,13 @@ def _with_prior(state: EstimatorState, latest: SegmentSolution, slopes: Array, v
         jacobian = found.considered.jacobian[:, :, :P]
         correction = found.correction[:, :P]
         systematic = np.einsum("ncp,nm,mcq->cpq", jacobian, found.considered.covariance, jacobian)
-    chance = _with_diagonal(latest.uncertainty.covariance, variances)
-    values, spread = weighed(structure, (slopes + correction).T, chance + systematic, expected, precision)
-    gain = structure.unit + (chance + systematic) * precision.T[:, None]
-    left = gained(gain, gained(gain, chance).swapaxes(1, 2))
-    beyond, least = (each.diagonal(axis1=1, axis2=2) for each in (spread - systematic, left))
-    return values.T - correction, np.maximum(beyond, least)
+    statistical = _with_diagonal(latest.uncertainty.covariance, variances)
+    K = statistical + systematic
+    values, posterior = weighed(structure, (slopes + correction).T, K, expected, precision)
+    gain = structure.unit + K * precision.T[:, None]
+    remaining = gained(gain, gained(gain, statistical).swapaxes(1, 2))
+    both = (matrix.diagonal(axis1=1, axis2=2) for matrix in (posterior - systematic, remaining))
+    return values.T - correction, np.maximum(*both)
 
 
 def _with_diagonal(covariance: Array, variances: Array) -> Array:

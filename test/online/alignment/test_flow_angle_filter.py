@@ -179,21 +179,10 @@ def test_it_says_what_is_reconstructed(columns: tuple[int, ...], said: str) -> N
 
 def test_it_starts_in_a_coordinated_turn_with_its_bank() -> None:
     """Truth: in a level coordinated turn at bank phi the yaw rate is g sin(phi) / V, and no side force is felt."""
-    V, bank = 20.0, math.radians(50.0)
-    load = 9.80665 / math.cos(bank)
-    sample = [0.0] * flow_angle_filter.CONTROLS + [0.0] * len(AIRCRAFT.controls)
-    sample[2], sample[4], sample[5] = (
-        -load,
-        9.80665 * math.sin(bank) ** 2 / math.cos(bank) / V,
-        9.80665 * math.sin(bank) / V,
-    )
-    sample[6], sample[ALPHA], sample[BETA], sample[9], sample[flow_angle_filter.AIR_INTERVAL] = (
-        V,
-        math.nan,
-        math.nan,
-        1.2,
-        0.01,
-    )
+    V, bank, g = 20.0, math.radians(50.0), 9.80665
+    q, r = g * math.sin(bank) ** 2 / math.cos(bank) / V, g * math.sin(bank) / V
+    measured = [0.0, 0.0, -g / math.cos(bank), 0.0, q, r, V, math.nan, math.nan, 1.2, math.nan, 0.01]
+    sample = measured + [0.0] * len(AIRCRAFT.controls)
     filter_ = flow_angle_filter.init(AIRCRAFT)
     flow_angle_filter.complete(filter_, 0.0, sample, 0.2)
     assert filter_.state[3] == pytest.approx(bank, abs=0.02)
