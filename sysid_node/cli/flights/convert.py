@@ -89,7 +89,7 @@ def _opened(args: argparse.Namespace, aircraft: Aircraft | None) -> LogFlight:
     content = content_of(args.log)
     if args.autopilot and content is Content.ROSBAG2:
         return LogFlight(read_recorded(args.log, adapter_for(args.autopilot, ADAPTERS, settings)), ())
-    if content is Content.TABLE:
+    if content is Content.TABLE and not args.topic:
         return LogFlight(streams_from_record(read_csv(args.log), aircraft), ())
     outputs = args.joints or (aircraft.outputs if aircraft is not None else "")
     flight = None if args.topic else open_log(args.log, settings, outputs)
