@@ -19,6 +19,7 @@ from sysid_node.aircraft.reading.body import (
 from sysid_node.aircraft.reading.controls import read_controls
 from sysid_node.aircraft.reading.derivatives import read_derivatives
 from sysid_node.aircraft.reading.effects import read_delays, read_effects
+from sysid_node.aircraft.reading.plausibility import warn_of_implausible
 from sysid_node.aircraft.reading.quantities import Quantities, positive
 from sysid_node.aircraft.reading.tables import read_tables
 from sysid_node.errors import InputError
@@ -63,7 +64,8 @@ def named_aircraft(name: str) -> Aircraft:
 def parse_aircraft(text: str, file: str = "<text>") -> Aircraft:
     """The aircraft that a YAML text describes; ``file`` is the name that errors give. Raises InputError.
 
-    Inertias that no rigid body has are an error; where the file is ``ideal`` they are a warning (``ModelWarning``).
+    Inertias that no rigid body has are an error; where the file is ``ideal`` they are a warning (``ModelWarning``), and
+    so are values that no aircraft has, whatever the file.
     """
     fields = parse_document(text, file).fields(_REQUIRED, optional=_OPTIONAL)
     quantities = Quantities()
@@ -71,7 +73,7 @@ def parse_aircraft(text: str, file: str = "<text>") -> Aircraft:
     controls, throttle = read_controls(fields["controls"], quantities)
     derivatives = read_derivatives(fields["derivatives"], controls)
     delays = read_delays(fields.get("delays"))
-    return Aircraft(
+    aircraft = Aircraft(
         name=fields["name"].text("the aircraft's name"),
         source=fields["source"].text("text: where the numbers are from") if "source" in fields else "",
         mass=quantities.read(fields["mass"], "mass", positive("kg")),
@@ -91,6 +93,8 @@ def parse_aircraft(text: str, file: str = "<text>") -> Aircraft:
         stated_tolerances=quantities.stated,
         outputs=fields["outputs"].text('text, e.g. "elevator=out2:1500:0.001"') if "outputs" in fields else "",
     )
+    warn_of_implausible(fields, aircraft)
+    return aircraft
 
 
 def aircraft_folders() -> list[Path]:

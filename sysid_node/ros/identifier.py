@@ -20,7 +20,6 @@ from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData, DerivativeEstimates, EstimateCorrelation, ModelGap
 
-from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.stated_effects import not_taken_in_words
 from sysid_node.errors import InputError
@@ -39,6 +38,7 @@ from sysid_node.online.parameters import LIVE, PARAMETERS, check, estimation_set
 from sysid_node.online.session import Due, Session
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.ros.support import conversion
+from sysid_node.ros.support.aircraft import aircraft_of
 from sysid_node.ros.support.declaring import declare, refusal, values_of
 from sysid_node.ros.support.diagnostics import DiagnosticSource, lag_level, lag_words, rejections
 from sysid_node.ros.support.lifecycle import CarefulNode
@@ -84,9 +84,7 @@ class Identifier(CarefulNode):
     def configure(self) -> None:
         """Load the aircraft file; make the estimator, the subscriptions and the publishers."""
         values = values_of(self, PARAMETERS)
-        if not values["aircraft"]:
-            raise InputError("parameter aircraft is empty: give a name or a file, e.g. --ros-args -p aircraft:=cdrw")
-        aircraft = load_aircraft(values["aircraft"])
+        aircraft = aircraft_of(self, values["aircraft"])
         self._session = self._make_session(aircraft, estimation_settings(values), values["publish_rate"])
         self._body_frame: BodyFrame = values["body_frame"]
         self._frame_id = ""

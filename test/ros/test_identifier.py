@@ -269,6 +269,15 @@ def test_effects_of_the_file_that_are_not_taken_into_account_are_said(probe: Pro
     assert "the estimators do not correct for stall_separation" in said[0]
 
 
+def test_what_no_aircraft_has_is_said(probe: Probe, tmp_path: Path) -> None:
+    heavy = tmp_path / "heavy.yaml"
+    heavy.write_text(dump_aircraft(replace(load_aircraft("cdrw"), mass=4000.0)), encoding="utf-8")
+    said: list[str] = []
+    with ended(start_identifier(f"aircraft:={heavy}"), said):
+        probe.await_identifier()
+    assert "mass: 4000 kg at 18 m/s on 0.7875 m^2 need a lift coefficient of 256" in said[0]
+
+
 def test_reset_and_save(probe: Probe, tmp_path: Path) -> None:
     folder = tmp_path / "made" / "here"
     with identifier(f"save_directory:={folder}"):

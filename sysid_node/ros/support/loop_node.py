@@ -14,7 +14,6 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
-from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.cdr.layout import DamageError
@@ -25,6 +24,7 @@ from sysid_node.flight.live.messages import LATEST_SECONDS, TOO_LATE, UNREADABLE
 from sysid_node.flight.live.monitor import TopicMonitor
 from sysid_node.parameter import NodeParameter, check_each
 from sysid_node.ros.support import conversion
+from sysid_node.ros.support.aircraft import aircraft_of
 from sysid_node.ros.support.declaring import declare, values_of
 from sysid_node.ros.support.message_types import fields_of
 from sysid_node.ros.support.spin import while_ros_is_up
@@ -67,9 +67,7 @@ class LoopNode(Node, ABC):
         self._table, self._live = table, live
         declare(self, table, lambda values: check_each(table, values))
         self.values = values_of(self, table)
-        if not self.values["aircraft"]:
-            raise InputError("parameter aircraft is empty: give a name or a file, e.g. --ros-args -p aircraft:=cdrw")
-        self.aircraft = load_aircraft(self.values["aircraft"])
+        self.aircraft = aircraft_of(self, self.values["aircraft"])
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.add_on_set_parameters_callback(self._on_parameters)
         self.every(1.0, self._on_tick)
