@@ -23,6 +23,7 @@ from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import counts_by_reason, joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.live.mean_force import MeanForce
+from sysid_node.flight.live.mean_lift import MeanLift
 from sysid_node.flight.logs.opening import carried_by
 from sysid_node.flight.pieces import PIECE, FlightPiece, FlightPieces, flight_pieces
 from sysid_node.flight.record import Array
@@ -35,7 +36,7 @@ from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_
 from sysid_node.online.estimates.log import EstimatesLog
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.types import AZ, Estimates
+from sysid_node.online.types import AZ, LIFT, Estimates
 from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.files.runs.estimates_bag import write_estimates
 from sysid_node.report.files.runs.run_folder import REPORT, write_run
@@ -175,7 +176,8 @@ class _Run:
         self.history, self.stamps = EstimatesLog(), array("q")
         self.samples = RecordedSamples(aircraft, flight.imu_messages)
         self.flow = flow_angle_filter.init(as_estimated(aircraft))
-        self.attitudes, self.force = _Attitudes(), MeanForce()
+        self.attitudes = _Attitudes()
+        self.force, self.lift = MeanForce(), MeanLift(aircraft)
         self.spans: dict[str, tuple[float, float]] = {}  # s, by topic
         self.joints: tuple[str, ...] = ()
         self.commands_from, self.frame_id = math.inf, ""
@@ -194,8 +196,10 @@ class _Run:
         count = sum(len(stream.arrival) for stream in streams.by_topic.values())
         aligned, known = self.alignment.take(streams, last=piece.last), len(self.stamps)
         self.force.add(aligned.time, aligned.samples[:, AZ])
+        self.lift.add(aligned.time, *aligned.samples[:, LIFT].T)
         if piece.last:
             self.force.check(self.flight.name)
+            self.lift.check(self.flight.name)
         self._identify(aligned, count)
         self._keep(aligned, streams)
         if self.monitor is not None:

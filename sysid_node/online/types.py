@@ -13,6 +13,7 @@ from typing import NamedTuple
 #: sample lies between, s: the flow angles' noise density is their variance times it. Body axes FRD.
 SAMPLE_COLUMNS = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "thrust", "air_interval")
 AZ = SAMPLE_COLUMNS.index("az")  # place of the specific force along z in a sample
+LIFT = tuple(SAMPLE_COLUMNS.index(name) for name in ("az", "V", "alpha", "rho"))  # places of what tells of the lift
 
 
 class DerivativeEstimate(NamedTuple):

@@ -16,12 +16,13 @@ from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.live.mean_force import MeanForce
+from sysid_node.flight.live.mean_lift import MeanLift
 from sysid_node.flight.logs.checks.survey import FULL_DEFLECTION, OUTPUTS, LogSurvey
 from sysid_node.flight.logs.opening import carried_by, load_flight_record
 from sysid_node.flight.pieces import flight_pieces
 from sysid_node.online.alignment.in_pieces import PieceAlignment
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.types import AZ
+from sysid_node.online.types import AZ, LIFT
 
 #: The shortest flight that ``sysid gap`` diagnoses, s (``gap.flightdata.gap_flight``, which takes long to load).
 SHORTEST_FOR_GAP = 6.0
@@ -75,8 +76,8 @@ def refusals_tried(
 def _refusal(path: Path, read: Callable[[], object]) -> str:
     """Why a reader refuses the flight, without the file's name; empty where it does not."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", InputWarning)  # the survey has told them, but for one
-        warnings.filterwarnings("always", ".*mean specific force", InputWarning)
+        warnings.simplefilter("ignore", InputWarning)  # the survey has told them, but for two
+        warnings.filterwarnings("always", ".*mean (specific force|lift|airspeed)", InputWarning)
         try:
             read()
         except InputError as error:
@@ -97,14 +98,16 @@ def _replayed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame)
         alignment = None
         spans: dict[str, tuple[float, float]] = {}
         names: tuple[str, ...] = ()
-        force = MeanForce()
+        force, lift = MeanForce(), MeanLift(aircraft)
         for piece in flight.pieces:
             names, spans = piece.streams.actuators.names, joined_spans(spans, stamp_spans(piece.streams))
             alignment = alignment or PieceAlignment(aircraft, max_gap, carried_by(piece.streams, setting))
             aligned = alignment.take(piece.streams, last=piece.last)
             force.add(aligned.time, aligned.samples[:, AZ])
+            lift.add(aligned.time, *aligned.samples[:, LIFT].T)
         if force.count:
             force.check(flight.name)
+            lift.check(flight.name)
             return
         Actuation.of(aircraft).require(names, flight.name)
         raise InputError(why_nothing_aligned(flight.name, spans, alignment.rejected if alignment else {}))

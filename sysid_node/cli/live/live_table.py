@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from sysid_node.aircraft.names import LONGITUDINAL
+from sysid_node.cli.shared.terminal import plain
 from sysid_node.online.types import DerivativeEstimate, Estimates
 
 SIDE_BY_SIDE = 170  # width of a terminal, in columns, from which the two halves stand side by side
@@ -90,7 +91,7 @@ def _cells(estimate: DerivativeEstimate | None, expected: float) -> tuple[Text, 
     mark = Text("✓", style="green") if inside else Text("✗", style="yellow")
     return (
         _number(estimate.value, "bold" if estimate.valid else "dim"),
-        Text(f"{estimate.lower:+.4f} to {estimate.upper:+.4f}", style=style),
+        Text(f"{plain(estimate.lower, '+')} to {plain(estimate.upper, '+')}", style=style),
         _number(expected, ""),
         mark if estimate.valid and math.isfinite(expected) else Text(),
         Text(estimate.status, style="green" if estimate.valid else "dim"),
@@ -98,4 +99,4 @@ def _cells(estimate: DerivativeEstimate | None, expected: float) -> tuple[Text, 
 
 
 def _number(value: float, style: str) -> Text:
-    return Text(f"{value:+.4f}" if math.isfinite(value) else "", style=style)
+    return Text(plain(value, "+") if math.isfinite(value) else "", style=style)

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from sysid_node.cli.live.loop_scenario import NODES, ONSET, LoopScenario
+from sysid_node.cli.shared.terminal import plain
 
 if TYPE_CHECKING:
     from sysid_node.ros.support.loop_watch import LoopWatch
@@ -46,7 +47,7 @@ def _derivatives(scenario: LoopScenario, watch: LoopWatch) -> Table:
             table.add_row(name, file, "", "", d.status if d else "")
             continue
         status = Text(d.status, style="green" if d.valid else "dim")
-        table.add_row(name, file, f"{d.value:+.4f}", f"{d.lower:+.4f} to {d.upper:+.4f}", status)
+        table.add_row(name, file, plain(d.value, "+"), f"{plain(d.lower, '+')} to {plain(d.upper, '+')}", status)
     return table
 
 

@@ -40,10 +40,15 @@ def show_estimates(final: Estimates, truth: Mapping[str, float], since: Mapping[
     if truth:
         table.add_column("true", justify="right", no_wrap=True)
     for d in final.derivatives.values():
-        cells = [d.name, f"{d.value:.4f}", f"{d.lower:.4f} to {d.upper:.4f}", d.status]
+        cells = [d.name, plain(d.value), f"{plain(d.lower)} to {plain(d.upper)}", d.status]
         known = [_true(d.name, truth, since or {})] if truth else []
         table.add_row(*cells, *known, style="" if d.valid else "dim")
     Console().print(table)
+
+
+def plain(value: float, sign: str = "") -> str:
+    """A derivative to four decimals; one that is too large for any, as of what was not excited, by three digits."""
+    return f"{value:{sign}.4f}" if not abs(value) >= 1e4 else f"{value:{sign}.2e}"
 
 
 def _true(name: str, truth: Mapping[str, float], since: Mapping[str, float]) -> str:

@@ -14,6 +14,7 @@ from sysid_node.flight.commands import JointMessage, read_commands
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.live.mean_force import checked_force
+from sysid_node.flight.live.mean_lift import checked_lift
 from sysid_node.flight.logs.autopilot_log import AutopilotLog
 from sysid_node.flight.logs.checks.refusals import refusal_of_log, refusal_of_streams, require
 from sysid_node.flight.logs.content import Content, content_of
@@ -108,9 +109,10 @@ def load_flight_record(
     ``carried``: what the actuators' messages, or a table's columns, are ("commands", "positions", or "auto").
     """
     if is_table(path):
-        return with_commands(aircraft, checked_force(read_csv(path)), carried)
+        return with_commands(aircraft, checked_lift(aircraft, checked_force(read_csv(path))), carried)
     streams = open_streams(path, aircraft, topics, frame)
-    return checked_force(flight_record(aircraft, streams, max_gap, carried_by(streams, carried)))
+    record = flight_record(aircraft, streams, max_gap, carried_by(streams, carried))
+    return checked_lift(aircraft, checked_force(record))
 
 
 def is_table(path: str | Path) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sysid_node.errors import InputError
+from sysid_node.flight.live.mean_lift import doubts
 from sysid_node.flight.record import Array
 from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.residuals.residual_model import ResidualModel
@@ -43,15 +44,14 @@ def require_admissible(model: ResidualModel, limits: Admission = THRESHOLDS.admi
     if not (1.0 / limits.lift_ratio < lift / expected < limits.lift_ratio or by_a_vane or stalled):
         raise InputError(
             f"{model.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
-            f"{model.simulator.aircraft.name!r}, not {expected:.2f} as in its file; "
-            f"another aircraft's flight{_or_imu(model)}?"
+            f"{model.simulator.aircraft.name!r}, not {expected:.2f} as in its file; {doubts()}{_or_imu(model)}"
         )
     return model
 
 
 def _or_imu(model: ResidualModel) -> str:
     """What else may be wrong where the flow angles are inferred."""
-    return ", or an IMU far off, from which its flow angles are inferred" if model.flight.inferred else ""
+    return " Its flow angles are inferred from the IMU: it may be far off, too." if model.flight.inferred else ""
 
 
 def signal_to_noise(model: ResidualModel) -> Array:
