@@ -104,6 +104,17 @@ def test_what_is_saved_is_what_the_command_writes(command, log, identified, tmp_
         assert (tmp_path / "api" / file.name).read_bytes() == file.read_bytes(), file.name
 
 
+def test_a_smooth_flight_held_out_is_read_as_the_commands_that_it_holds(tmp_path):
+    """Steps show commands, a multisine does not; both flights were recorded alike, with servos of 0.1 s."""
+    for name, manoeuvre in (("steps", "3211"), ("smooth", "multisine")):
+        words = ["--manoeuvre", manoeuvre, "--effect", "actuator_lag:time_constant=0.1", "--out", str(tmp_path / name)]
+        assert main(["simulate", "--aircraft", "cdrw", "--seed", "1", *words, "--quiet"]) == 0
+    steps, smooth = (load(tmp_path / name, "cdrw") for name in ("steps", "smooth"))
+    assert (steps.record.commanded, smooth.record.commanded) == (True, False)
+    held_out = identify(steps, "equation_error", holdout=[smooth]).run.holdout["smooth"]
+    assert min(held_out["Cl"]["r_squared"], held_out["Cm"]["r_squared"]) > 0.95  # below zero as positions
+
+
 def test_without_pandas_one_line_says_so(replayed, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match="to_pandas needs pandas, which is not installed: pip install pandas"):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
@@ -18,6 +18,8 @@ from sysid_node.flight.topics import topic_names
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -84,3 +86,21 @@ def load(
     """
     known = aircraft if isinstance(aircraft, Aircraft) else load_aircraft(aircraft)
     return FlightFile(Path(path), known, topic_names(topics), body_frame)
+
+
+def read_alike(
+    flights: Sequence[FlightFile],
+    carried: str,
+    read: Callable[[FlightFile, str], T],
+    is_commanded: Callable[[T], bool],
+) -> list[T]:
+    """What ``read(flight, carried)`` gives of the flights of one recorder.
+
+    Whether the actuators' messages are commands is told from the messages where ``carried`` is "auto". Smooth inputs do
+    not tell it. A flight that does not is read as the others are, where one of them is known to hold commands.
+    """
+    found = [read(flight, carried) for flight in flights]
+    if carried != "auto" or not any(map(is_commanded, found)):
+        return found
+    pairs = zip(found, flights, strict=True)
+    return [one if is_commanded(one) else read(flight, "commands") for one, flight in pairs]

@@ -13,8 +13,9 @@ from markupsafe import Markup
 from sysid_node.aircraft.model import Derivative
 from sysid_node.api.compiled_programs import release_compiled_programs
 from sysid_node.api.data_frames import data_frame
-from sysid_node.api.flight_file import FlightFile
+from sysid_node.api.flight_file import FlightFile, read_alike
 from sysid_node.errors import InputError
+from sysid_node.flight.commanded import CARRIED
 from sysid_node.gap.correction import corrected_aircraft
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.diagnose import diagnose as diagnose_flights
@@ -111,6 +112,7 @@ def diagnose(
     holdout: Sequence[FlightFile] = (),
     simulator: str | None = None,
     simulated: Sequence[FlightFile] = (),
+    actuators: str = "auto",
     resume: str | Path | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> GapDiagnosis:
@@ -122,22 +124,31 @@ def diagnose(
     diagnosis goes on. ``progress`` is called with the share done (0..1) and what is being done. A diagnosis takes about
     a minute for a minute of flight. ``simulator``: ``jsbsim:NAME`` or
     ``jsbsim:FILE``, a model of the same aircraft; the correction is written into a copy of it, and both fly there.
+    ``actuators``: what the actuators' messages are, "commands", "positions", or "auto": told from those of all flights.
 
-    Raises InputError where the aircraft file has no tolerances, a flight cannot be read, is fitted and held out at
-    once, or shows no motion; where the simulator's model cannot be read or is another aircraft's; and where the
-    simulated flights do not suffice.
+    Raises InputError where ``actuators`` is no such word, the aircraft file has no tolerances, a flight cannot be read,
+    is fitted and held out at once, or shows no motion; where the simulator's model cannot be read or is another
+    aircraft's; and where the simulated flights do not suffice.
     """
     flights = [flights] if isinstance(flights, FlightFile) else list(flights)
     if not flights:
         raise InputError("no flight to diagnose; give at least one")
     if simulator is not None and simulated:
         raise InputError("simulator and simulated: both are given; give the model, or flights recorded in it")
+    if actuators not in CARRIED:
+        raise InputError(f"actuators = {actuators!r}: expected one of {', '.join(CARRIED)}")
     aircraft = flights[0].aircraft
     theirs = None if simulator is None else user_simulator(simulator, aircraft)
-    fitted, held_out, of_simulator = (
-        [load_gap_flight(f.path, aircraft, f.topics, f.body_frame) for f in group]
-        for group in (flights, holdout, simulated)
+    real, of_simulator = (
+        read_alike(
+            group,
+            actuators,
+            lambda f, carried: load_gap_flight(f.path, aircraft, f.topics, f.body_frame, carried),
+            lambda flight: flight.record.commanded,
+        )
+        for group in ([*flights, *holdout], list(simulated))
     )
+    fitted, held_out = real[: len(flights)], real[len(flights) :]
     keep = None if resume is None else Path(resume)
     release_compiled_programs()
     report = progress or (lambda share, doing: None)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sysid_node.api.compiled_programs import release_compiled_programs
 from sysid_node.api.estimated_run import EstimatedRun
-from sysid_node.api.flight_file import FlightFile
+from sysid_node.api.flight_file import FlightFile, read_alike
 from sysid_node.batch.identify import Identification, refuse_unused
 from sysid_node.batch.identify import identify as identify_records
 from sysid_node.batch.settings import BatchSettings
@@ -67,9 +67,13 @@ def identify(
     refuse_unused(method, settings or {})
     tell = progress or (lambda share, doing: None)
     tell(0.0, "reading the flights")
-    records, held_out = (
-        [flight.aligned(chosen.max_gap, chosen.actuators) for flight in group] for group in (flights, holdout)
+    every = read_alike(
+        [*flights, *holdout],
+        chosen.actuators,
+        lambda flight, carried: flight.aligned(chosen.max_gap, carried),
+        lambda record: record.commanded,
     )
+    records, held_out = every[: len(flights)], every[len(flights) :]
     tell(0.2, method.replace("_", " "))
     release_compiled_programs()
     aircraft = flights[0].aircraft

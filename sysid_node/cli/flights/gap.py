@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from sysid_node.api.flight_file import load
 from sysid_node.cli.shared import options
 from sysid_node.cli.shared.terminal import progress_bar
+from sysid_node.flight.commanded import CARRIED
 from sysid_node.report.files.outputs.output_folder import output_folder
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
         "flights recorded in your simulator, on the same topics: it is identified from them, and stands in its place"
     )
     parser.add_argument("--simulated", metavar="SIM", type=Path, nargs="+", action="extend", default=[], help=meaning)
+    meaning = "what the actuators' messages are (default: told from the messages of all flights)"
+    parser.add_argument("--actuators", choices=CARRIED, default="auto", help=meaning)
     options.add_out(parser, "; started again with the same folder, an interrupted run continues where it stopped")
     options.add_reading(parser)
     return parser
@@ -49,7 +52,7 @@ def run(args: argparse.Namespace) -> None:
     with output_folder(args.out, "gap", inputs=inputs, force=args.force, working=[UNFINISHED]) as out:
         with progress_bar("gap", quiet=args.quiet) as progress:
             found = diagnose(flights, holdout=holdout, simulator=args.simulator, simulated=simulated,
-                             resume=args.out / UNFINISHED, progress=progress)  # fmt: skip
+                             actuators=args.actuators, resume=args.out / UNFINISHED, progress=progress)  # fmt: skip
         out.publish(found.write)
     if not args.quiet:
         print(found.words)

@@ -61,20 +61,29 @@ class GapFlight:
         return self.command_interval or 1.0 / self.actuator_rate
 
 
-def load_gap_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None, frame: BodyFrame) -> GapFlight:
-    """The flight of a bag or a log. Raises InputError where it is unreadable, lacks a signal or is too short."""
+def load_gap_flight(
+    path: Path,
+    aircraft: Aircraft,
+    topics: Mapping[str, str] | None,
+    frame: BodyFrame,
+    carried: str = "auto",
+) -> GapFlight:
+    """The flight of a bag or a log. ``carried``: what the actuators' messages are, as of ``flight_record``.
+
+    Raises InputError where it is unreadable, lacks a signal or is too short.
+    """
     if is_table(path):
         record = checked_force(read_csv(path))
         rate = 1.0 / float(np.median(np.diff(record.time)))
         return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
-    return flight_of_streams(open_streams(path, aircraft, topics, frame), aircraft, str(path))
+    return flight_of_streams(open_streams(path, aircraft, topics, frame), aircraft, str(path), carried)
 
 
-def flight_of_streams(streams: Streams, aircraft: Aircraft, source: str = "") -> GapFlight:
+def flight_of_streams(streams: Streams, aircraft: Aircraft, source: str = "", carried: str = "auto") -> GapFlight:
     """The flight of recorded messages. Raises InputError where it lacks a signal or is too short."""
     Actuation.of(aircraft).require(streams.actuators.names, streams.name)
     # commands are held, but the servos are the simulator's own
-    record = checked_force(flight_record(aircraft, streams, 0.2, "auto", servos=False))
+    record = checked_force(flight_record(aircraft, streams, 0.2, carried, servos=False))
     rates = [1e9 / float(np.median(np.diff(s.arrival.stamp_ns))) for s in streams.by_topic.values()]
     flight = GapFlight(record, rates[0], rates[1], rates[2], source=source)
     return completed_flight(aircraft, replace(flight, command_interval=streams.actuators.interval))
@@ -151,7 +160,8 @@ def _first_run(record: FlightRecord) -> FlightRecord:
     keep = slice(int(edges[longest]), int(edges[longest + 1]))
     columns = {name: values[keep] for name, values in record.columns.items()}
     time = record.time[keep] - record.time[keep][0]
-    return FlightRecord(time, columns, record.name, record.start_ns, record.rejected)
+    start, commanded = record.start_ns, record.commanded
+    return FlightRecord(time, columns, record.name, start, record.rejected, commanded)
 
 
 def resampled(flight: GapFlight, rate: float = ANALYSIS_RATE) -> FlightRecord:

@@ -83,13 +83,19 @@ def gap_of_errors(models: Sequence[ResidualModel], tables: Sequence[Array]) -> G
 def weather_suffices(models: Sequence[ResidualModel]) -> bool:
     """Whether weather and the sensors' noise account for the error of the file's own simulator in every reading.
 
-    Then no effect is a cause, however well it imitates the weather.
+    Then no effect is a cause, however well it imitates the weather. They must do so in all flights together, and in
+    each: a flight in gusts hides what a calm one shows.
     """
     tables = [_table(v, *[[v.simulator.neutral()] * len(window_groups(v))] * 2) for v in models if can_be_simulated(v)]
     if not tables or not all(np.isfinite(table).all() for table in tables):
         return False
     excited = of_motions(READINGS, excited_motions(models))
-    _, _, before, _, _, *floors = np.concatenate(tables, axis=1).mean(axis=1)[:, excited]
+    return all(_is_weather(table[..., excited]) for table in (np.concatenate(tables, axis=1), *tables))
+
+
+def _is_weather(table: Array) -> bool:
+    """Whether weather accounts for the error by the file in mean squares as for ``gap_of_errors``."""
+    _, _, before, _, _, *floors = table.mean(axis=1)
     return weather_accounts_for(before, np.array(floors))
 
 

@@ -72,3 +72,12 @@ def test_weather_is_foreseen_and_effects_are_not(aircraft, make_flight) -> None:
     assert weather_suffices([residual_model_of(simulator, weather)])
     slow = make_flight({"structural_mode": {"gain": 0.3}}, seed=6)
     assert not weather_suffices([residual_model_of(simulator, slow)])
+
+
+def test_a_flight_in_gusts_does_not_hide_what_a_calm_one_shows(aircraft, make_flight) -> None:
+    """Servos of 30 ms in severe turbulence and in still air: weather covers them in the first flight only."""
+    simulator, slow = Simulator(aircraft, 50.0), {"actuator_lag": {"time_constant": 0.03}}
+    flights = (make_flight(slow, seed=7, turbulence="severe"), make_flight(slow, seed=8))
+    gusty, calm = (residual_model_of(simulator, flight) for flight in flights)
+    assert weather_suffices([gusty])
+    assert not weather_suffices([gusty, calm])
