@@ -62,12 +62,10 @@ class Diagnosis:
 
     @property
     def measured_on(self) -> str:
-        """The flight on which the gap is measured, in words."""
+        """On what the gap is measured: flights ``held_out``, ``parts`` that were not fitted, or what was ``fitted``."""
         if self.held_out:
-            return "the flight held out"
-        if can_be_divided(self.models):
-            return "parts of the flight that were not fitted"
-        return "the flight that was fitted, whose only manoeuvre cannot be divided"
+            return "held_out"
+        return "parts" if can_be_divided(self.models) else "fitted"
 
     @property
     def gap(self) -> Gap:

@@ -26,7 +26,7 @@ from sysid_node.sim.model.parameters import StatedParameter, stated_parameters
 def document(found: Diagnosis) -> dict[str, Any]:
     """The content of gap.json."""
     attribution = found.attribution
-    left = attribution.structure_left
+    left, unexplained = attribution.structure_left, unexplained_share(found.scores)
     return {
         "verdict": found.verdict,
         "aircraft": found.aircraft.name,
@@ -35,6 +35,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
             "measured_by": "short_flights" if found.simulation_gap else "forces_and_kinematics",
             "window_s": length_of(found.models[0]) if found.simulation_gap else found.models[0].windows.length,
             "held_out": found.held_out,
+            "measured_on": found.measured_on,
             "forces_and_kinematics": {**gap_content(found.gap), "window_s": found.models[0].windows.length},
         },
         "not_excited": quiet_motions(found.models),
@@ -46,8 +47,8 @@ def document(found: Diagnosis) -> dict[str, Any]:
             {"effect": label, "probability": probability, "share": share} for label, probability, share in ranked(found)
         ],
         "unexplained": {
-            "share": unexplained_share(found.scores),
-            "where": [w for w in found.where if w["station"] == "unexplained"][:3],
+            "share": unexplained,
+            "where": [w for w in found.where if w["station"] == "unexplained"][:3] if unexplained else [],
             "coherent_share": {c: float(s) for c, s in zip(CHANNELS, left.share, strict=True)},
         },
         "next_flight": found.next_flight,

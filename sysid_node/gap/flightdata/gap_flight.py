@@ -54,6 +54,7 @@ class GapFlight:
     left_out: float = 0.0  # s without a manoeuvre that were cut off
     metered: bool = True  # whether thrust was measured; else it is inferred from the file's drag
     command_interval: float = 0.0
+    begin: float = 0.0  # s of the recording at which the record's time is zero
 
     @property
     def step_interval(self) -> float:
@@ -95,7 +96,8 @@ def completed_flight(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     Only its longest part without an interruption is kept. Raises InputError where another signal is missing, or where
     the flight is too short.
     """
-    flight = _with_flow_angles(aircraft, replace(flight, record=_first_run(flight.record)))
+    record, begin = _longest_run(flight.record)
+    flight = _with_flow_angles(aircraft, replace(flight, record=record, begin=flight.begin + begin))
     return _with_thrust(aircraft, _with_lateral(aircraft, flight))
 
 
@@ -152,16 +154,20 @@ def with_inferred_signals(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     return replace(flight, record=with_inferred_thrust(aircraft, flight.record))
 
 
-def _first_run(record: FlightRecord) -> FlightRecord:
-    """The longest part without an interruption of more than half a second; its time begins at zero."""
+def _longest_run(record: FlightRecord) -> tuple[FlightRecord, float]:
+    """The longest part without an interruption of more than half a second, and when it begins, s.
+
+    Its own time begins at zero.
+    """
     breaks = np.flatnonzero(np.diff(record.time) > 0.5)
     edges = np.concatenate([[0], breaks + 1, [len(record)]])
     longest = int(np.argmax(np.diff(edges)))
     keep = slice(int(edges[longest]), int(edges[longest + 1]))
     columns = {name: values[keep] for name, values in record.columns.items()}
-    time = record.time[keep] - record.time[keep][0]
-    start, commanded = record.start_ns, record.commanded
-    return FlightRecord(time, columns, record.name, start, record.rejected, commanded)
+    time, first = record.time[keep], float(record.time[keep][0])
+    start, commanded = record.start_ns + round(1e9 * first), record.commanded
+    run = FlightRecord(time - first, columns, record.name, start, record.rejected, commanded)
+    return run, first - float(record.time[0])
 
 
 def resampled(flight: GapFlight, rate: float = ANALYSIS_RATE) -> FlightRecord:

@@ -49,6 +49,7 @@ def cut_to_manoeuvre(flight: GapFlight, controls: tuple[str, ...]) -> GapFlight:
         record=_between(flight.record, begin, end),
         history=flight.history and flight.history.between(begin, end),
         left_out=flight.record.duration - (end - begin),
+        begin=flight.begin + begin,
     )
 
 

@@ -101,6 +101,11 @@ class ResidualModel:
         return self.measurement.axes
 
     @property
+    def motion_power(self) -> Array:
+        """Power (12,) of what was measured, about the windows' means; zero where nothing was."""
+        return np.asarray((np.abs(self.measured[:, 1:]) ** 2).sum(axis=(0, 1)) * self.axes)
+
+    @property
     def commands(self) -> Array:
         """Commands (N, controls + 1) as recorded: deflections in rad, thrust in N."""
         return np.asarray(self.inputs.signals.commands)[: len(self.record)]

@@ -20,10 +20,10 @@ def simulator_error(models: Sequence[ResidualModel], noise: Mapping[str, float])
     sensors, SI.
     """
     left = sum(power_of(model.residual(model.simulator.neutral())) for model in models)
-    motion = sum((np.abs(model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for model in models)
-    quiet = sum(len(m.measured) * (m.noise.sum(axis=0) - 0.5 * m.noise[0]) for m in models)
+    motion = sum(model.motion_power for model in models)
+    quiet = sum(m.axes * len(m.measured) * (m.noise.sum(axis=0) - 0.5 * m.noise[0]) for m in models)
     moved = motion > THRESHOLDS.validation.motion * quiet
-    channels = np.sqrt(np.where(moved, left / np.maximum(motion, 1e-300), 0.0)) * models[0].axes
+    channels = np.sqrt(np.where(moved, left / np.maximum(motion, 1e-300), 0.0))
     readings = error_shares(models, noise)
-    shares = list(readings.values()) or channels[models[0].axes].tolist()
+    shares = list(readings.values()) or channels[np.any([model.axes for model in models], axis=0)].tolist()
     return SimulatorError(channels, readings, float(np.sqrt(np.mean(np.square(shares)))))

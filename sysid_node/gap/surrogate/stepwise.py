@@ -103,8 +103,8 @@ def _is_improved(smaller: CandidateFit, larger: CandidateFit) -> bool:
 def error_power(fit: CandidateFit) -> Array:
     """Power (12,) of the residual as a share of the motion."""
     left = sum(power_of(flight.residual) for flight in fit.flights)
-    motion = sum((np.abs(model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for model in fit.models)
-    return np.asarray(left / np.maximum(motion, 1e-300) * fit.models[0].axes)
+    motion = sum(model.motion_power for model in fit.models)
+    return np.asarray(left / np.maximum(motion, 1e-300))
 
 
 def _without_superfluous(fitter: CandidateFitter, fit: CandidateFit) -> CandidateFit:

@@ -55,8 +55,8 @@ class _Powers:
 
     def table(self, structure: Array) -> Array:
         """Powers (4, G, 12) of the errors and of the noise floor, where a share (12,) of what is left is structure."""
-        before, tolerances, after = self.errors
-        floor = np.minimum(np.maximum(self.noise, after * (1.0 - structure)), np.minimum(before, tolerances))
+        after = self.errors[2]
+        floor = np.minimum(np.maximum(self.noise, after * (1.0 - structure)), self.errors.min(axis=0))
         return np.stack([*self.errors, floor])
 
     def overall(self, weight: Array, structure: Array) -> Array:
@@ -84,13 +84,14 @@ def _powers_of(base: Evidence, after: Evidence) -> _Powers:
     """Powers of the flights of evidence without and with the causes."""
     models = [flight.model for flight in base.flights]
     groups = [(model, group) for model in models for group in window_groups(model)]
-    measured = np.array([(np.abs(model.measured[g][:, 1:]) ** 2).sum(axis=(0, 1)) for model, g in groups])
-    noise = np.array([len(g) * (model.noise.sum(axis=0) - 0.5 * model.noise[0]) for model, g in groups])
+    measured = np.array([(np.abs(m.measured[g][:, 1:]) ** 2).sum(axis=(0, 1)) * m.axes for m, g in groups])
+    noise = np.array([len(g) * (m.noise.sum(axis=0) - 0.5 * m.noise[0]) * m.axes for m, g in groups])
     before = [model.residual(model.simulator.neutral()) for model in models]
     fitted = ([flight.residual for flight in evidence.flights] for evidence in (base, after))
     errors = np.array([_powers(residuals, models) for residuals in (before, *fitted)])
     moved = measured.sum(axis=0) > THRESHOLDS.validation.motion * noise.sum(axis=0)
-    return _Powers(measured, noise, errors, models[0].axes & moved & excited_channels(models))
+    known = np.all([model.axes for model in models], axis=0)  # as of short flights
+    return _Powers(measured, noise, errors, known & moved & excited_channels(models))
 
 
 def gap_from(overall: Array, draws: Array, channels: dict[str, dict[str, float]]) -> Gap:

@@ -21,6 +21,9 @@ _BINS = 12
 #: Samples above which a bin is shown, and windows from which on a correlation over windows is computed.
 _FEWEST_SAMPLES, _FEWEST_WINDOWS = 20, 4
 
+#: What the corrections leave.
+_LEFT = ("unexplained", "noise")
+
 #: Signals that a missing coefficient may depend on, and their units.
 REGIMES = {"alpha": "rad", "beta": "rad", "V": "m/s", "thrust": "N", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
 
@@ -45,12 +48,15 @@ def where(attribution: Attribution) -> list[dict[str, Any]]:
     """
     models = attribution.base.fit.models
     before = [model.residual(model.simulator.neutral()) for model in models]
-    flights = list(zip(models, before, strict=True))
-    motion = np.asarray(sum((np.abs(model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for model in models))
+    remaining = [flight.residual for flight in attribution.corrected.flights]
+    motion = np.asarray(sum(model.motion_power for model in models))
     powers = [_power(before), *(_power(residuals) for residuals in _residuals_in_turn(attribution.corrected))]
     stations = [*(candidate.station for candidate in attribution.chosen.fit.candidates), "aerodynamics"]
     shares = station_shares(stations, np.array(powers) / np.maximum(motion, 1e-300), attribution.structure_left.share)
-    return [{"station": s, "axis": CHANNELS[a], "share": share, **_when(flights, a)} for (s, a), share in shares]
+    return [
+        {"station": s, "axis": CHANNELS[a], "share": share, **_when(models, remaining if s in _LEFT else before, a)}
+        for (s, a), share in shares
+    ]
 
 
 def station_shares(stations: Sequence[str], powers: Array, structure: Array) -> list[tuple[tuple[str, int], float]]:
@@ -87,18 +93,19 @@ def _power(residuals: Sequence[Complex]) -> Array:
     return np.asarray(sum(power_of(residual) for residual in residuals))
 
 
-def _when(flights: Sequence[tuple[ResidualModel, Complex]], axis: int) -> dict[str, Any]:
-    """Band, time and regime that hold most of a channel's gap, on the longest flight."""
-    model, residual = max(flights, key=lambda pair: pair[0].windows.count)
+def _when(models: Sequence[ResidualModel], residuals: Sequence[Complex], axis: int) -> dict[str, Any]:
+    """Band, time and regime that hold most of what a channel's residuals are, on the longest of the fitted flights."""
+    model, residual = max(zip(models, residuals, strict=True), key=lambda pair: pair[0].windows.count)
     power = np.abs(residual[:, 1:, axis]) ** 2
     by_line, by_window = power.sum(axis=0), power.sum(axis=1)
     low, high = shortest_run(np.bincount(model.windows.bands[1:], by_line, len(BAND_EDGES) - 1).astype(float))
     first, last = shortest_run(by_window)
-    starts = model.windows.starts
+    starts = model.flight.begin + model.windows.starts
     return {
         "band_hz": [float(BAND_EDGES[low]), float(min(BAND_EDGES[high + 1], model.windows.frequencies[-1]))],
         "regime": regime_of(model, by_window),
         "window_s": [float(starts[first]), float(starts[last] + model.windows.length)],
+        "flight": model.record.name,
     }
 
 

@@ -76,11 +76,11 @@ def sampling_power(fit: CandidateFit) -> Array:
         intervals = model.flight.step_interval, 1.0 / model.flight.air_rate
         slopes = model.slopes(point, [model.simulator.names.index(f"{clock}.delay") for clock in CLOCKS])
         left += sum(power_of(slopes[..., i]) * interval**2 / 12.0 for i, interval in enumerate(intervals))
-        motion += (np.abs(model.measured[:, 1:]) ** 2).sum(axis=(0, 1))
+        motion += model.motion_power
     return left / np.maximum(motion, 1e-300)
 
 
 def _motion(evidence: Evidence) -> Array:
     """Power (12,) of what was measured, about the windows' means."""
-    power = sum((np.abs(flight.model.measured[:, 1:]) ** 2).sum(axis=(0, 1)) for flight in evidence.flights)
+    power = sum(flight.model.motion_power for flight in evidence.flights)
     return np.asarray(np.maximum(power, 1e-300))

@@ -8,6 +8,7 @@ Fedorov (1975), Biometrika 62(1)).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -78,16 +79,16 @@ def advice_in_words(verdict: str, confused: str, best: Proposal | None, threshol
         return _LARGER
     if best.separation < thresholds.verdict.separated:
         return (
-            f"no manoeuvre parts {confused} (at most {best.separation:.2g} standard deviations): what they "
+            f"no manoeuvre distinguishes {confused} (at most {best.separation:.2g} standard deviations): what they "
             "do in flight is the same; measure on the ground"
         )
     if best.separation <= best.flown:
         return (
-            f"the same again, longer and in still air: no other manoeuvre parts {confused} better than "
+            f"the same again, longer and in still air: no other manoeuvre distinguishes {confused} better than "
             f"those flown ({best.flown:.3g} standard deviations of the sensors' noise)"
         )
     return (
-        f"{best.words}, in still air: parts {confused} by {best.separation:.3g} standard deviations or "
+        f"{best.words}, in still air: distinguishes {confused} by {best.separation:.3g} standard deviations or "
         f"more, the manoeuvres flown by {best.flown:.3g}"
     )
 
@@ -95,7 +96,8 @@ def advice_in_words(verdict: str, confused: str, best: Proposal | None, threshol
 def _listed(attribution: Attribution) -> str:
     """The causes beside which alternatives are named, and these, with commas between."""
     doubtful = [cause for cause in attribution.causes if named(cause)]
-    return ", ".join(dict.fromkeys(e for cause in doubtful for e in (cause.candidate.effect, *named(cause))))
+    effects = dict.fromkeys(e for cause in doubtful for e in (cause.candidate.effect, *named(cause)))
+    return ", ".join(effect.replace("_", " ") for effect in effects)
 
 
 def named(cause: Cause) -> list[str]:
@@ -115,7 +117,8 @@ def _confused(cause: Cause) -> list[FittedSet]:
 def propose(fit: CandidateFit, pairs: Sequence[tuple[Candidate, CandidateFit]]) -> Proposal | None:
     """The best of the proposals for pairs of a cause and the fit of an alternative; none where none can be flown."""
     model = fit.models[0]
-    flown = min(_separation(model, fit.flights[0].point, *pair, fit) for pair in pairs)
+    flights = list(zip(fit.models, fit.flights, strict=True))
+    flown = min(math.hypot(*(_separation(m, f.point, *pair, fit) for m, f in flights)) for pair in pairs)
     found: list[Proposal] = []
     for words, shape, width, share, throttle in _PROPOSALS:
         try:

@@ -48,6 +48,13 @@ _PARAMETERS = {
 #: Units in which a pilot thinks: SI unit -> factor and unit.
 _PILOTS = {"rad": (180.0 / math.pi, "deg"), "rad/s": (180.0 / math.pi, "deg/s")}
 
+#: On what a gap is measured (``Diagnosis.measured_on``), in words.
+MEASURED_ON = {
+    "held_out": "the flight held out",
+    "parts": "parts of the flight that were not fitted",
+    "fitted": "the flight that was fitted (its only manoeuvre cannot be divided)",
+}
+
 
 def parameter_words(name: str) -> str:
     """A parameter of an effect in words: ``"Cm_q"`` is ``"pitch damping"``, ``"q"`` is ``"pitch rate"``."""

@@ -159,6 +159,13 @@ def _missing(flight: FlightTable) -> list[PlotPanel]:
     return panels
 
 
+def _starts(gap: Mapping[str, Any]) -> str:
+    """How often the simulator starts again, where short flights are shown."""
+    if gap.get("measured_by") != "short_flights":
+        return ""
+    return f" The simulator starts again from the measured state every {gap['window_s']:g} s."
+
+
 def _about(content: Mapping[str, Any], flights: int, arrows: list[Arrow]) -> str:
     gap = content["gap"]
     causes = ", ".join(words_of(cause["label"]) for cause in content["causes"]) or "none"
@@ -168,7 +175,7 @@ def _about(content: Mapping[str, Any], flights: int, arrows: list[Arrow]) -> str
         f"Error of the simulator: {_percent(gap['before'])} of the motion with the aircraft file, "
         f"{_percent(gap['after'])} corrected; {_percent(gap['noise_floor'])} is noise.",
         "Pale, in the middle: as measured. Orange, at its left: as the simulator flies it with the aircraft file. "
-        "Blue, at its right: corrected. The simulator starts again from the measured state every two seconds.",
+        f"Blue, at its right: corrected.{_starts(gap)}",
         *(
             f"{a.name.capitalize()}: 1 m of its arrow is {1.0 / a.metres_per_unit:.3g} {a.unit}; a second arrow, "
             "to the same scale, is what is still missing after the correction."

@@ -58,7 +58,7 @@ def test_a_flight_in_which_an_alternative_diverges_tells_nothing_apart(fits) -> 
         ("unsupported", "", None, "larger and at two airspeeds"),
         ("ambiguous", "a, b", None, "larger and at two airspeeds"),  # none can be flown
         ("ambiguous", "a, b", Proposal("a sweep", 2.9, 1.0), "measure on the ground"),
-        ("ambiguous", "a, b", Proposal("a sweep", 3.0, 1.0), "a sweep, in still air: parts a, b by 3 "),
+        ("ambiguous", "a, b", Proposal("a sweep", 3.0, 1.0), "a sweep, in still air: distinguishes a, b by 3 "),
         ("ambiguous", "a, b", Proposal("a sweep", 4.0, 4.0), "the same again"),
         ("explained", "a, b", Proposal("a sweep", 9.0, 4.0), "the manoeuvres flown by 4"),
     ],

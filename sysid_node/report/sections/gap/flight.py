@@ -41,7 +41,7 @@ def flight(found: Diagnosis) -> Mapping[str, Any]:
     panels = _short_flights(found) if found.simulation_gap else _coefficients(found)
     return {
         "panels": panels,
-        "held_out": found.held_out,
+        "measured_on": found.measured_on,
         "short": bool(found.simulation_gap),
         "window": f"{length_of(found.models[0]):g} s",
     }

@@ -9,9 +9,10 @@ from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.short_flights.readings import length_of
 from sysid_node.gap.validation.spectral_error import STAGES
 from sysid_node.report.sections.gap.paragraph import paragraph
-from sysid_node.report.wording.causes import WORDS, percent
+from sysid_node.report.wording.causes import MEASURED_ON, WORDS, percent
 from sysid_node.report.wording.names import words_of
 from sysid_node.report.wording.numbers import number
+from sysid_node.sim.signals.low_pass import CORNER
 
 #: The stages of a gap's error, in words.
 _STAGE_WORDS = ("Gap before", "Within tolerances", "Gap after", "Noise floor")
@@ -19,13 +20,14 @@ _STAGE_WORDS = ("Gap before", "Within tolerances", "Gap after", "Noise floor")
 
 def opening(found: Diagnosis) -> Mapping[str, Any]:
     """The paragraph and the figures beside it."""
-    gap = found.size
+    gap, model = found.size, found.models[0]
     low, high = gap.ci95
     length = f"{length_of(found.models[0]):g}" if found.simulation_gap else f"{found.models[0].windows.length:.2g}"
+    ends = f" ({number(low, 3)} to {number(high, 3)})" if low < high else ""  # equal where nothing scatters
     facts = [
         ("Verdict", words_of(found.verdict)),
         *((words, percent(getattr(gap, stage))) for words, stage in zip(_STAGE_WORDS, STAGES, strict=True)),
-        ("Closed", f"{number(gap.shrink_percent, 3)} % ({number(low, 3)} to {number(high, 3)})"),
+        ("Closed", f"{number(gap.shrink_percent, 3)} %{ends}"),
     ]
     return {
         "text": paragraph(found),
@@ -33,6 +35,9 @@ def opening(found: Diagnosis) -> Mapping[str, Any]:
         "next_flight": found.next_flight,
         "short": bool(found.simulation_gap),
         "window": f"{length} s",
+        "low_pass": f"{CORNER * model.simulator.rate:.2g} Hz",
+        "highest": f"{model.windows.frequencies[-1]:.2g} Hz",
+        "vanes": not any(one.flight.inferred for one in found.models),
     }
 
 
@@ -45,7 +50,7 @@ def channels(found: Diagnosis) -> Mapping[str, Any]:
     return {
         "rows": rows,
         "whole": [whole, ends],
-        "measured_on": found.measured_on,
+        "measured_on": MEASURED_ON[found.measured_on],
         "short": bool(found.simulation_gap),
         "window": f"{length_of(found.models[0]):g} s",
     }

@@ -13,6 +13,7 @@ from sysid_node.gap.residuals.excited_axes import quiet_motions
 from sysid_node.gap.short_flights.readings import length_of
 from sysid_node.gap.validation.spectral_error import Gap
 from sysid_node.report.wording.causes import (
+    MEASURED_ON,
     WORDS,
     alike,
     in_pilots_units,
@@ -114,14 +115,16 @@ def _share(found: Diagnosis) -> str:
 def _correction(found: Diagnosis, condition: str) -> str:
     """The error on flight that was not fitted, before and after; ``condition`` begins the sentence."""
     gap, (low, high) = found.size, found.size.ci95
-    flight = found.measured_on
-    floor = f"Noise alone would leave {percent(gap.noise_floor)}."
+    flight = MEASURED_ON[found.measured_on]
+    left = "Noise alone would leave" if found.simulation_gap else "What follows neither controls nor flow leaves"
+    floor = f"{left} {percent(gap.noise_floor)}."
     if gap.after > 0.95 * gap.before:
         return f"{condition} the error on {flight} is {percent(gap.after)} of the motion. {floor}"
+    # all that is left counts as noise: nothing scatters
+    interval = f" (95 % interval {number(low, 3)} to {number(high, 3)})" if low < high else ""
     return (
         f"{condition} the error on {flight} falls from {percent(gap.before)} to {percent(gap.after)} of the motion, "
-        f"which closes {number(gap.shrink_percent, 3)} % (95 % interval {number(low, 3)} to {number(high, 3)}) of the "
-        f"gap above the noise. {floor}"
+        f"which closes {number(gap.shrink_percent, 3)} %{interval} of the gap above the noise. {floor}"
     )
 
 
@@ -168,10 +171,8 @@ def _left_out(found: Diagnosis) -> str:
     seconds = sum(model.flight.left_out for model in found.models)
     if not seconds:
         return ""
-    return (
-        f"The flight has one manoeuvre. {number(seconds, 2)} s of flight without a manoeuvre were left out, and the "
-        "result was checked on parts of the manoeuvre."
-    )
+    checked = ", and the result was checked on parts of the manoeuvre" if found.measured_on == "parts" else ""
+    return f"The flight has one manoeuvre. {number(seconds, 2)} s of flight without a manoeuvre were left out{checked}."
 
 
 def _cause(cause: Mapping[str, Any], known: str) -> str:

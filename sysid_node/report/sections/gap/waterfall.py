@@ -33,7 +33,8 @@ def where(found: Diagnosis) -> Mapping[str, Any]:
          ", ".join(_span(name, *ends) for name, ends in w["regime"].items()))
         for w in found.where[:8]
     ]  # fmt: skip
-    return {"figure": waterfall(found), "rows": rows, "unknown": found.verdict == "unknown_effect"}
+    unknown, flown = found.verdict == "unknown_effect", next((w["flight"] for w in found.where), "")
+    return {"figure": waterfall(found), "rows": rows, "unknown": unknown, "flight": flown}
 
 
 def _span(name: str, low: float, high: float) -> str:
