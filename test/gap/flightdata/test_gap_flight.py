@@ -106,6 +106,14 @@ def test_only_the_longest_part_without_an_interruption_is_kept(aircraft, time) -
     assert kept.record.time[0] == 0.0
 
 
+def test_a_part_knows_when_it_begins(aircraft, time) -> None:
+    flight = flight_with(aircraft)
+    interrupted = time + 3.0 * (time > 2.0)
+    kept = completed_flight(aircraft, replace(flight, record=replace(flight.record, time=interrupted)))
+    assert kept.begin == pytest.approx(5.0, abs=2.0 / RATE)
+    assert (kept.record.start_ns - flight.record.start_ns) * 1e-9 == pytest.approx(kept.begin)
+
+
 def test_lateral_signals_that_were_not_measured_are_zero(aircraft) -> None:
     flight = completed_flight(aircraft, without(flight_with(aircraft), "ay", "p", "r", "beta"))
     assert not flight.lateral and set(flight.filled) == {"ay", "p", "r", "beta"}

@@ -19,6 +19,7 @@ def test_the_only_manoeuvre_is_kept_with_what_rings_after_it(aircraft) -> None:
     assert cut.left_out == pytest.approx(flight.record.duration - cut.record.duration, abs=0.05)
     assert abs(cut.record["de"]).max() == abs(flight.record["de"]).max()
     assert (cut.record.start_ns - flight.record.start_ns) * 1e-9 == pytest.approx(18.0, abs=0.5)
+    assert cut.begin == pytest.approx(18.0, abs=0.5)
 
 
 def test_a_manoeuvre_at_the_end_keeps_enough_before_it(aircraft) -> None:

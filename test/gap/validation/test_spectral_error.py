@@ -87,6 +87,28 @@ def test_errors_are_shares_of_the_motion_and_the_floor_is_what_is_no_structure(s
     assert gap.per_channel["V"]["after"] == pytest.approx(0.2)
 
 
+def test_the_order_of_flights_does_not_matter_where_one_lacks_a_channel() -> None:
+    """What one flight does not measure is compared in none, as in short flights; the other channel is as before."""
+
+    def of(*flights: Any) -> Gap:
+        pair = SimpleNamespace(flights=flights)
+        return gap_of(pair, pair, structure(1.0))
+
+    whole, part = flight(0.2), flight(0.4)
+    part.model.axes[CHANNELS.index("V")] = False
+    part.residual[..., CHANNELS.index("V")] = 0.0
+    gap, reversed_order = of(whole, part), of(part, whole)
+    assert (reversed_order.before, reversed_order.after) == pytest.approx((gap.before, gap.after))
+    assert set(gap.per_channel) == {"CL"}
+    assert gap.after == pytest.approx(np.sqrt((0.2**2 + 0.4**2) / 2.0))
+
+
+def test_what_is_left_is_never_below_its_noise_floor() -> None:
+    """Errors below the sensors' noise: the noise of the windows was less than its mean."""
+    gap = gap_of(evidence(0.04), evidence(0.02), structure(1.0))
+    assert gap.noise_floor == pytest.approx(0.02) and gap.shrink_percent == pytest.approx(100.0)
+
+
 def test_groups_that_are_all_alike_leave_no_doubt() -> None:
     gap = gap_of(evidence(0.4), evidence(0.2), structure(0.75))
     assert gap.ci95 == pytest.approx((gap.shrink_percent, gap.shrink_percent))

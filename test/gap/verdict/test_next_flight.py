@@ -38,6 +38,16 @@ def test_a_lag_and_a_delay_are_parted_by_some_flight(fits) -> None:
     assert np.isfinite(best.flown)
 
 
+def test_all_flights_that_were_flown_count(aircraft, fits) -> None:
+    """Two flights that are alike tell the square root of two times as much as one."""
+    chosen = fits["command_delay"]
+    pairs = [(chosen.candidates[0], fits["actuator_lag"])]
+    twice = replace(chosen, flights=chosen.flights * 2)
+    one, two = propose(chosen, pairs), propose(twice, pairs)
+    assert one is not None and two is not None
+    assert two.flown == pytest.approx(np.sqrt(2.0) * one.flown)
+
+
 def test_a_flight_in_which_an_alternative_diverges_tells_nothing_apart(fits) -> None:
     """SVD does not converge on what is not finite."""
     chosen, alternative = fits["command_delay"], fits["actuator_stamp_delay"]
