@@ -127,7 +127,9 @@ def _diagnosis(
     simulator = Simulator(aircraft, analysis_rate(aircraft, lateral=lateral))
     models, others = ([_model_of(simulator, flight, surrogate) for flight in group] for group in (flights, holdouts))
     room = surrogate.room if surrogate else {}
-    nuisances, *theirs = (nuisances_of(aircraft, model, (*models, *others), room) for model in (models[0], *others))
+    every = (*models, *others)
+    nuisances = nuisances_of(aircraft, models[0], every, room, fitted_with=models[1:])
+    theirs = [nuisances_of(aircraft, model, every, room) for model in others]
     held_out = [HeldOutFlight(*parts) for parts in zip(others, theirs, strict=True)]
     checkpoint = Checkpoint.of(keep, models)
     attribution = attribute(models, nuisances, lambda s, t: progress(0.05 + 0.85 * s, t), checkpoint, held_out)

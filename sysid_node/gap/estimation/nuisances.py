@@ -138,28 +138,32 @@ def nuisances_of(
     model: ResidualModel,
     others: Sequence[ResidualModel] = (),
     room: Mapping[str, float] = MappingProxyType({}),
+    fitted_with: Sequence[ResidualModel] = (),
 ) -> Nuisances:
     """The nuisance parameters of one of an aircraft's flights, with limits by the flight's own rates.
 
-    They are the same parameters for all flights that are diagnosed together, ``others`` included. ``room`` is 1 sigma
+    They are the same parameters for all flights that are diagnosed together, ``others`` included. Flights that are
+    ``fitted_with`` it have the same limits: those of the slowest messages, and of flow angles that were not measured
+    in one of them. ``room`` is 1 sigma
     of errors of derivatives, by name, from which their priors are widened where they are a cause and where it is more
     than the file's tolerance: a simulator knows its derivatives better than they agree with reality. Raises InputError
     where the aircraft file has no tolerances and is no simulator's.
     """
-    models = (model, *others)
+    models, alike = (model, *others), [one.flight for one in (model, *fitted_with)]
     tolerances = _required_tolerances(aircraft)
     lateral = any(m.flight.lateral for m in models)
     sigma = {f"derivative_error.{n}": t for n, t in tolerances.items() if lateral or n.partition("_")[0] not in LATERAL}
     believed = believed_effects(model.simulator)
     sigma |= believed
     sigma |= {n: s for n, s in _biases(aircraft).items() if lateral or n.rpartition(".")[2] not in LATERAL_SIGNALS}
-    sigma |= {f"vane_bias.{angle}": THRESHOLDS.priors.inferred_angle for angle in model.flight.inferred}
+    sigma |= {f"vane_bias.{angle}": THRESHOLDS.priors.inferred_angle for flight in alike for angle in flight.inferred}
     if any(is_gusty(m) for m in models):
         sigma["turbulence.rotation"] = THRESHOLDS.priors.rotation
     limit = {name: THRESHOLDS.priors.limit * s for name, s in sigma.items()}
     ranged = [*believed, *(name for name in sigma if name.startswith("turbulence"))]
     limit |= {name: min(limit[name], room) for name, room in _room(model.simulator, ranged).items()}
-    for clock, interval in zip(CLOCKS, (model.flight.step_interval, 1.0 / model.flight.air_rate), strict=True):
+    longest = max(flight.step_interval for flight in alike), max(1.0 / flight.air_rate for flight in alike)
+    for clock, interval in zip(CLOCKS, longest, strict=True):
         sigma[f"{clock}.delay"], limit[f"{clock}.delay"] = 0.5 * interval, interval
     names = model.simulator.names
     of_aircraft = ("derivative_error", "turbulence", *CLOCKS, *(f"{name}" for name in believed))

@@ -41,6 +41,20 @@ def test_the_clock_of_a_slow_logs_commands_may_be_off_by_its_interval(aircraft, 
         assert (found.sigma[place], found.limit[place]) == pytest.approx((0.5 * interval, interval))
 
 
+def test_flights_that_are_fitted_together_have_the_same_limits_in_any_order(aircraft, plain_model) -> None:
+    """Those of the slowest messages, and of the flow angles that one of them did not measure."""
+    other = replace(plain_model.flight, command_interval=0.1, air_rate=5.0, inferred=("alpha",))
+    slow = replace(plain_model, flight=other)
+    orders = ((plain_model, slow), (slow, plain_model))
+    first, second = (nuisances_of(aircraft, one, fitted_with=[two]) for one, two in orders)
+    assert first.indices == second.indices
+    assert first.limit == pytest.approx(second.limit)
+    limits = dict(zip((plain_model.simulator.names[i] for i in first.indices), first.limit, strict=True))
+    assert limits["actuator_stamp_delay.delay"] == pytest.approx(0.1)
+    assert limits["air_data_delay.delay"] == pytest.approx(0.2)
+    assert limits["vane_bias.alpha"] == pytest.approx(THRESHOLDS.priors.limit * THRESHOLDS.priors.inferred_angle)
+
+
 def test_a_simulators_file_is_right_within_a_small_share_unless_it_states_tolerances(aircraft) -> None:
     plain = {name: replace(d, tolerance=None) for name, d in aircraft.derivatives.items()}
     assert derivative_tolerances(replace(aircraft, derivatives=plain)) == {}
