@@ -96,6 +96,7 @@ class Replay(EstimatedRun):
             truth=self.truth.values,
             truth_since=self.truth.since,
             faults=self.faults,
+            commanded=commanded,
             remarks=[*flow_angle_filter.remarks(self.flow), *filter(None, said)],
         )
         publishing = {"publish_rate": self.publish_rate, "actuators_carry": "commands" if commanded else "positions"}

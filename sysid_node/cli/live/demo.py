@@ -132,6 +132,7 @@ def _result(flight: DemoFlight, follower: Follower, history: list[Estimates]) ->
         rejected=_rejected(follower),
         truth=flight.truth,
         title=f"{flight.bag.name}, identified live",
+        commanded=flight.aligned.commands_from < flight.aligned.time.size,
     )
 
 

@@ -20,6 +20,7 @@ from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
 from sysid_node.report.results.comparison import changes
+from sysid_node.report.results.late_controls import late_controls
 from sysid_node.report.results.recorded_samples import RecordedSamples
 from sysid_node.report.results.run_result import References, RunData, RunResult, prior_of
 from sysid_node.report.results.servo_remarks import servo_remarks
@@ -60,10 +61,14 @@ def replay_result(
     title: str = "",
     faults: FaultVerdict | None = None,
     remarks: Sequence[str] = (),
+    commanded: bool = False,
 ) -> RunResult:
-    """All that a report needs, from the aligned samples and the estimates over time."""
+    """All that a report needs, from the aligned samples and the estimates over time.
+
+    ``commanded``: whether the samples' deflections follow from commands by the aircraft file's servos.
+    """
     noticed = sorted({at for e in history[-1:] for name in e.derivatives for at in changes(history, name)})
-    motion = _motion(aircraft, *recorded.last, history)
+    motion = _motion(aircraft, *recorded.last, history, commanded=commanded)
     counted = motion and motion.since(max(noticed, default=0.0))
     return RunResult(
         aircraft=aircraft.name,
@@ -103,15 +108,22 @@ def _fault_remarks(faults: FaultVerdict | None) -> list[str]:
 
 
 def _motion(
-    aircraft: Aircraft, time: Array, samples: Array, history: Sequence[Estimates]
+    aircraft: Aircraft, time: Array, samples: Array, history: Sequence[Estimates], *, commanded: bool
 ) -> CoefficientHistories | None:
-    """The complete samples, an unknown thrust taken as zero, as in the estimator; None for fewer than ten."""
+    """The complete samples, an unknown thrust taken as zero, as in the estimator; None for fewer than ten.
+
+    The model has the deflections behind servos with the estimated times, as the estimator has them.
+    """
     filled = samples.copy()
     filled[np.isnan(filled[:, THRUST]), THRUST] = 0.0
     complete = np.isfinite(filled).all(axis=1)
     if complete.sum() < FEWEST:
         return None
     time, filled = time[complete], filled[complete]
+    recorded = filled[:, len(SAMPLE_COLUMNS) :].copy()
+    if history:
+        servos = history[-1].servos
+        filled[:, len(SAMPLE_COLUMNS) :] = late_controls(aircraft, time, recorded, servos, commanded=commanded)
     row, (ca, sa) = array_signals(aircraft)(list(filled.T))
     acceleration = np.gradient(filled[:, 3:6], time, axis=0)
     X, Y, Z, L, M, N = (acceleration @ momentum_matrix(aircraft)).T
@@ -122,7 +134,7 @@ def _motion(
     # the row lacks the drift, which stands before the regressors
     regressors = {name: row[columns.column(name) - 1] / k for name in columns.regressors}
     modelled = _modelled(aircraft, {"0": np.ones(time.size), **regressors}, history[-1]) if history else {}
-    controls = {symbol: filled[:, len(SAMPLE_COLUMNS) + i] for i, symbol in enumerate(aircraft.control_symbols)}
+    controls = dict(zip(aircraft.control_symbols, recorded.T, strict=True))
     return CoefficientHistories(time, controls, measured, modelled)
 
 
