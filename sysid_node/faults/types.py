@@ -51,7 +51,7 @@ class Fault:
         if not math.isnan(self.lower):
             words += f" ({amount(self.lower, self.unit)} to {amount(self.upper, self.unit)})"
         if self.changes:
-            words += ", " + ", ".join(f"{c.name} {c.value:+.3g}" for c in self.changes[:3])
+            words += ", changes: " + ", ".join(f"{c.name} {c.value:+.3g}" for c in self.changes[:3])
         return words
 
     def values(self, now: float) -> dict[str, str]:

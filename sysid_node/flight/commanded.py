@@ -119,9 +119,9 @@ def commands_of(aircraft: Aircraft, carried: str, *, servos: bool = True) -> Rec
 
 def carried_in_words(aircraft: Aircraft, setting: str, commanded: bool) -> str:
     """A sentence for the reader: what the topic carries, how that is known, and what follows."""
-    how = " (told from the messages)" if setting == "auto" else ""
+    how = " (inferred from the messages)" if setting == "auto" else ""
     if commanded:
-        return f"Actuators carry commands{how}; of the servos the aircraft file says: {in_words(aircraft)}."
+        return f"Actuators carry commands{how}; {in_words(aircraft)}."
     if setting == "auto":
         taken = "Actuators are taken as positions: no command jumps that a surface could not follow."
         return f"{taken} {_UNSAID}" if aircraft.ideal else taken

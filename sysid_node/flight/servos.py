@@ -148,13 +148,14 @@ def _second_order(servo: Servo, error: float, rate: float, step: float) -> tuple
 
 
 def in_words(aircraft: Aircraft) -> str:
-    """What the aircraft file says of the servos, as the end of a sentence."""
+    """What the aircraft file states of the servos, as the end of a sentence."""
     servos_in_words = [
         f"{name} {', '.join(words)}"
         for name, servo in zip(aircraft.controls, servos_of(aircraft)[1:], strict=True)
         if (words := _words(servo))
     ]
-    return "; ".join(servos_in_words) or "nothing"
+    stated = "; ".join(servos_in_words)
+    return f"servos by the aircraft file: {stated}" if stated else "the aircraft file states nothing of the servos"
 
 
 def _words(servo: Servo) -> list[str]:

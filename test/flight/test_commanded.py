@@ -64,7 +64,7 @@ def test_an_ideal_file_wants_to_be_told_what_smooth_messages_are():
     ideal = replace(aircraft, ideal=True)
     assert "state what they carry" in carried_in_words(ideal, "auto", commanded=False)
     assert "state" not in carried_in_words(aircraft, "auto", commanded=False)
-    assert "state" not in carried_in_words(ideal, "auto", commanded=True)
+    assert "state what" not in carried_in_words(ideal, "auto", commanded=True)
     assert carried_in_words(ideal, "positions", commanded=False) == ""
 
 

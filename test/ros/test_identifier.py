@@ -257,7 +257,7 @@ def test_what_actuators_are_taken_for_is_said_once_and_again_when_it_changes(pro
         probe.speak(flight, start=2.9)
         probe.until(lambda: probe.said("estimate", "actuators carry") == "commands")
     assert said[0].count("Actuators are taken as positions: no command jumps that a surface could not follow.") == 1
-    assert said[0].count("Actuators carry commands (told from the messages); of the servos the aircraft file says") == 1
+    assert said[0].count("Actuators carry commands (inferred from the messages); the aircraft file states nothing") == 1
 
 
 def test_effects_of_the_file_that_are_not_taken_into_account_are_said(probe: Probe, tmp_path: Path) -> None:

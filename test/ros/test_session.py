@@ -98,7 +98,7 @@ def test_what_actuators_are_taken_for_follows_the_messages() -> None:
     assert session.carried.startswith("Actuators are taken as positions")
     fly(session, flight, "iaj")
     assert session.commanded
-    assert session.carried.startswith("Actuators carry commands (told from the messages)")
+    assert session.carried.startswith("Actuators carry commands (inferred from the messages)")
     session.reset()
     assert not session.commanded
     stated = Session(load_aircraft("cdrw"), OnlineSettings(actuators="positions"), 10.0)

@@ -12,6 +12,9 @@ from sysid_node.report.results.run_result import RunResult
 from sysid_node.report.sections.section import Section
 from sysid_node.report.wording.numbers import number, seconds
 
+#: Derivatives that are listed with a fault: those that changed most surely.
+_SHOWN = 4
+
 
 def context(run: RunResult) -> Mapping[str, Any]:
     """Rows of the table, and the length of flight that was checked."""
@@ -28,7 +31,10 @@ def _row(episode: Episode) -> dict[str, str]:
         "what": f"{fault.part}: {fault.kind}",
         "size": amount(fault.size, fault.unit) if known else "",
         "interval": interval,
-        "changes": ", ".join(f"{c.name} {c.value:+.3g} ({c.lower:+.3g} to {c.upper:+.3g})" for c in fault.changes),
+        "changes": ", ".join(
+            f"{c.name} {c.value:+.3g} ({c.lower:+.3g} to {c.upper:+.3g})" for c in fault.changes[:_SHOWN]
+        )
+        + (f" and {len(fault.changes) - _SHOWN} more" if len(fault.changes) > _SHOWN else ""),
         "since": f"{fault.since:.1f}",
         "found": f"{fault.found:.1f}",
         "until": "to the end" if episode.until is None else f"{episode.until:.1f}",

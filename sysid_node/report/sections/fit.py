@@ -33,6 +33,7 @@ def context(run: RunResult) -> Mapping[str, Any]:
             }
             for fit in fits
         ],
+        "batch": not run.method.endswith("_rft"),
         "response_note": run.signals.response_note,
         "responses": [(name, symbol(name), r.unit, _figure(name, r)) for name, r in run.signals.responses.items()],
         "holdout": [_flight(name, outputs) for name, outputs in run.holdout.items()],

@@ -12,7 +12,7 @@ from sysid_node.online.types import DerivativeEstimate
 from sysid_node.report.results.comparison import agrees, covers, half_width
 from sysid_node.report.results.run_result import RunResult
 from sysid_node.report.sections.section import Section
-from sysid_node.report.wording.names import METHOD_WORDS, short_meaning, status_words, symbol
+from sysid_node.report.wording.names import METHOD_WORDS, short_meaning, status_words, symbol, words_of
 from sysid_node.report.wording.numbers import listing, number, plural, seconds
 
 #: What the sign of a derivative means in the air: (derivative, if negative, if positive).
@@ -138,7 +138,7 @@ def _facts(run: RunResult) -> list[tuple[str, str]]:
     lost = sum(run.data.rejected.values())
     return [
         ("Aircraft", run.aircraft),
-        ("Method", METHOD_WORDS.get(run.method, run.method)),
+        ("Method", METHOD_WORDS.get(run.method, words_of(run.method))),
         ("Data", f"{seconds(run.data.seconds)}, {plural(run.data.samples, 'sample')}"),
         ("Rejected", plural(lost, "message") if lost else "nothing"),
     ]

@@ -64,6 +64,10 @@ METHOD_WORDS = {
     "frequency_equation_error": "equation error in the frequency domain",
     "output_error": "output error (maximum likelihood)",
     "filter_error": "filter error (maximum likelihood with process noise)",
+    "recursive_least_squares": "recursive least squares",
+    "error_filtering": "recursive least squares with error filtering",
+    "constrained_least_squares": "recursive least squares with constraints",
+    "neural_gauss_newton": "neural Gauss-Newton",
 }
 
 _C = Markup('<span class="symbol"><i>C</i><sub>{}</sub></span>')
@@ -121,6 +125,9 @@ def unit(name: str) -> str:
 
 def status_words(status: str) -> str:
     """A status in words for a pilot; an unknown status is returned as it is."""
+    control, late, _ = status.partition(" not on time")
+    if late:
+        return f"the servo lag or the clock of {REGRESSOR_WORDS.get(control, control)} is not known well enough"
     return next((words for start, words in STATUS_WORDS.items() if status.startswith(start)), status)
 
 

@@ -27,11 +27,14 @@ def test_known_times_stand_beside_those_of_the_file() -> None:
     file = replace(CDRW, effects={"actuator_lag": lags, "command_delay": {"elevator": UncertainValue(0.01)}})
     estimates = found(elevator=(0.0561, 0.0082, True), aileron=(0.0349, 0.0041, True), rudder=(0.2, 0.3, False))
     assert servo_remarks(file, estimates) == [
-        "Controls follow what is recorded of them later by: elevator 56 ± 8 ms (the file says 52 ms), "
-        "aileron 35 ± 4 ms (the file says nothing)."
+        "Surfaces lag what is recorded of them by: elevator 56 ± 8 ms (the file says 52 ms), "
+        "aileron 35 ± 4 ms (the file says nothing).",
+        "Not known well enough: the lag of rudder 200 ± 300 ms.",
     ]
 
 
-def test_nothing_is_said_where_no_time_is_known() -> None:
-    assert servo_remarks(CDRW, found(elevator=(0.05, 0.2, False))) == []
+def test_times_that_are_not_known_are_named_as_such() -> None:
+    assert servo_remarks(CDRW, found(elevator=(0.05, 0.2, False))) == [
+        "Not known well enough: the lag of elevator 50 ± 200 ms."
+    ]
     assert servo_remarks(CDRW, found()) == []
