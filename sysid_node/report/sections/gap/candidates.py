@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
@@ -14,11 +14,11 @@ from sysid_node.report.wording.numbers import NONE, likely, number, with_interva
 def candidates(found: Diagnosis) -> Mapping[str, Any]:
     """The effects that were fitted alone, and the causes with their parameters."""
     content = document(found)
+    named = [c["effect"] for c in content["causes"]]
     rows = [
-        (label_words(c["effect"]), NONE if c["probability"] is None else likely(c["probability"]),
-         f"{100 * c['share']:.1f}", 100 * c["share"])
+        (label_words(c["effect"]), _probability(c, named), f"{100 * c['share']:.1f}", 100 * c["share"])
         for c in content["candidates"]
-    ]  # fmt: skip
+    ]
     doubted = [_doubted(c) for c in content["doubted"]]
     causes = [
         {
@@ -31,6 +31,13 @@ def candidates(found: Diagnosis) -> Mapping[str, Any]:
         for c in content["causes"]
     ]
     return {"rows": rows, "causes": causes, "doubted": ", ".join(doubted), "confusion": _confusion(found)}
+
+
+def _probability(candidate: Mapping[str, Any], causes: Sequence[str]) -> str:
+    """The probability of a candidate, or why it has none: it is a cause's effect with other parameters."""
+    if candidate["probability"] is not None:
+        return likely(candidate["probability"])
+    return "as the cause" if any(candidate["effect"].startswith(f"{effect} of ") for effect in causes) else NONE
 
 
 def _doubted(cause: Mapping[str, Any]) -> str:
