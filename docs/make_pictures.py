@@ -31,7 +31,7 @@ RUNS = {
 SHOWN = {
     "replay_opening": ("replay", ("opening", "derivatives"), (1200, 1080)),
     "replay_history": ("replay", ("history",), (900, 668)),
-    "failed_faults": ("failed", ("faults",), (1000, 240)),
+    "failed_faults": ("failed", ("faults",), (1000, 310)),
     "gap_opening": ("gap", ("opening",), (900, 330)),
     "gap_channels": ("gap", ("channels",), (900, 640)),
     "gap_where": ("gap", ("where",), (900, 525)),
