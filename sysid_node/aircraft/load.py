@@ -53,14 +53,6 @@ def load_aircraft(name_or_path: str | Path) -> Aircraft:
     return parse_aircraft(text, str(path))
 
 
-def named_aircraft(name: str) -> Aircraft:
-    """The aircraft that comes with the package, by its name, which is never taken for a path.
-
-    Raises InputError where there is none.
-    """
-    return load_aircraft(_shipped(name))
-
-
 def parse_aircraft(text: str, file: str = "<text>") -> Aircraft:
     """The aircraft that a YAML text describes; ``file`` is the name that errors give. Raises InputError.
 
