@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 from aircraft_loads import coefficients
 
+from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
+from sysid_node.sim.export.jsbsim import export_jsbsim
 
 pytest.importorskip("jsbsim", reason="JSBSim is not installed")
 
 from sysid_node.sim.importing.jsbsim.files import copy_model, find_model, sections
 from sysid_node.sim.importing.jsbsim.program import Flight, Program
 from sysid_node.sim.importing.jsbsim.read import read_jsbsim, read_model
+from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, properties_at
+from sysid_node.sim.importing.jsbsim.survey import survey_model
 
 
 @pytest.fixture(scope="module")
@@ -95,6 +99,52 @@ def test_servos_are_read_out_of_the_flight_control_system(tmp_path):
     assert effects["actuator_backlash"]["elevator"].value == pytest.approx(0.02)
     assert effects["actuator_bias"]["elevator"].value == pytest.approx(0.004)
     assert "aileron" not in effects["actuator_lag"]
+
+
+ELEVON = """<summer name="fcs/{0}-elevon-pos-rad"><input>fcs/elevator-position-rad</input>
+<input>{1}fcs/aileron-position-rad</input></summer>"""
+READ = "<property>fcs/{}-pos-rad</property>"
+MIXED = (
+    "<product><value>0.5</value><{0}>" + READ.format("right-elevon") + READ.format("left-elevon") + "</{0}></product>"
+)
+
+
+def test_elevons_are_moved_by_two_controls(tmp_path):
+    """kestrel's aerodynamics read from elevons what its elevator and aileron were: its derivatives and servos remain.
+
+    Each elevon is moved by both commands; half their sum is the elevator, half their difference the aileron.
+    """
+    kestrel = load_aircraft("kestrel")
+    lags = dict.fromkeys(kestrel.controls, 0.03) | {"aileron": 0.05}
+    head, air = export_jsbsim(kestrel, {"actuator_lag": lags}).text.split("<aerodynamics", 1)
+    mixer, thrust = ELEVON.format("left", "-") + ELEVON.format("right", ""), '<pure_gain name="fcs/thrust-lbs">'
+    for name, kind in (("elevator", "sum"), ("aileron", "difference")):
+        air = air.replace(f"<property>fcs/{name}-position-rad</property>", MIXED.format(kind))
+    assert thrust in head
+    (tmp_path / "kestrel.xml").write_text(head.replace(thrust, mixer + thrust) + "<aerodynamics" + air)
+    found = read_jsbsim(str(tmp_path / "kestrel.xml"), 16.0).aircraft
+    for name, known in kestrel.derivatives.items():
+        assert found.derivatives[name].value == pytest.approx(known.value, abs=1e-6), name
+    assert {n: lag.value for n, lag in found.effects["actuator_lag"].items()} == pytest.approx(lags)
+
+
+def test_two_commands_move_a_tail_as_in_the_program():
+    """JSBSim's f16 has a tail that elevator and aileron move: both at once as its own flight control system has it."""
+    survey = survey_model("f16", 150.0)
+    program = Program(survey.files, 100.0)
+    shared = set(survey.surfaces[0].properties) & set(survey.surfaces[1].properties)
+    assert shared
+    state = Flight(150.0, 0.03, theta=0.03, throttle=0.5)
+    shares = {"elevator": 0.5, "aileron": 0.5, "rudder": 0.5}
+    program.put(state, {COMMANDS[name]: share for name, share in shares.items()})
+    program.step(300)
+    deflections = {}
+    for s in survey.surfaces:
+        order = np.argsort(s.command)
+        deflections[s.name] = float(np.interp(shares[s.name], s.command[order], s.deflection[order]))
+    ours = properties_at(survey.surfaces, deflections)
+    for name in sorted(shared):
+        assert ours[name] == pytest.approx(float(program.fdm[name]), abs=1e-3), name
 
 
 def test_a_jet_and_its_yaw_damper(recwarn):

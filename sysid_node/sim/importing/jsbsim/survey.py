@@ -13,7 +13,7 @@ from sysid_node.errors import InputError
 from sysid_node.sim.importing.jsbsim.actuators import JsbsimServo, chain_to, read_servo, throttle_times
 from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model, find_model, outputs_of, sections
 from sysid_node.sim.importing.jsbsim.program import LEVER, Flight, Program, never_destroy_programs
-from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, JsbsimSurface, find_surfaces, gains_to
+from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, JsbsimSurface, find_surfaces, gains_to, properties_at
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight, default_airspeeds, find_trim, no_trim
 
 #: Altitude (m) where none is given: above ground effect.
@@ -87,7 +87,7 @@ def _survey(
         raise InputError(
             f"model {files.label}: no command moves a surface that the aerodynamics read; it must be an aeroplane"
         )
-    found = {s.name: _servo(stock, s, systems, replace(start, airspeed=speeds[0])) for s in surfaces}
+    found = {s.name: _servo(stock, s, surfaces, systems, replace(start, airspeed=speeds[0])) for s in surfaces}
     servos, chains = {n: servo for n, (servo, _) in found.items()}, {n: chain for n, (_, chain) in found.items()}
     moved = {name for surface in surfaces for name in surface.properties}
     program = Program(copy_model(files, place / "driven", moved, (LEVER,)))
@@ -126,20 +126,24 @@ def _usual_signs(program: Program, surfaces: Sequence[JsbsimSurface], steady: St
     place = {"elevator": 4, "aileron": 3, "rudder": 5}
 
     def moment(name: str, change: float) -> float:
-        driven: dict[str, float] = {}
-        for surface in surfaces:
-            driven |= surface.at(steady.deflections[surface.name] + (change if surface.name == name else 0.0))
-        program.put(steady.state, driven)
+        moved = {**steady.deflections, name: steady.deflections[name] + change}
+        program.put(steady.state, properties_at(surfaces, moved))
         return float(program.loads().air[place[name]])
 
     return [s.flipped() if moment(s.name, 0.02) > moment(s.name, -0.02) else s for s in surfaces]
 
 
 def _servo(
-    program: Program, surface: JsbsimSurface, systems: Sequence[Element], state: Flight
+    program: Program,
+    surface: JsbsimSurface,
+    surfaces: Sequence[JsbsimSurface],
+    systems: Sequence[Element],
+    state: Flight,
 ) -> tuple[JsbsimServo, ServoChain]:
     """The servo of a control; ``program`` runs the model with its own flight control system."""
-    chain = chain_to(surface.position, systems, COMMANDS[surface.name])
+    own = COMMANDS[surface.name]
+    others = {COMMANDS[s.name] for s in surfaces if s is not surface and surface.position in s.properties}
+    chain = chain_to(surface.position, systems, own, others)
     names = [name for component in chain for name in outputs_of(component)]
     gains = gains_to(program, surface, names, state, _WATCH_RATE)
     return read_servo(chain, gains, _FRAMES), ServoChain(tuple(names), gains)

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.errors import InputError
 from sysid_node.sim.importing.jsbsim.program import Flight, Program
-from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
+from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface, properties_at
 
 Array = NDArray[np.float64]
 
@@ -79,10 +79,7 @@ def _solve(  # type: ignore[no-untyped-def]
 
     def residual(z: Array) -> Array:
         at = dict(zip(names, (float(x) for x in z), strict=True))
-        driven: dict[str, float] = {}
-        for surface in surfaces:
-            driven |= surface.at(at[surface.name])
-        program.put(_state(state, at), driven)
+        program.put(_state(state, at), properties_at(surfaces, at))
         moving = program.accelerations()
         moving[3:] *= 10.0
         return np.array([*moving, *(program.climb for _ in level)])
