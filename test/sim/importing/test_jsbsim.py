@@ -161,6 +161,8 @@ def test_a_jet_and_its_yaw_damper(recwarn):
         ("none/here.xml", None, "not found"),
         ("ball", None, "must be an aeroplane"),
         ("c172p", 5.0, "no steady level flight at 5 m/s"),
+        ("c310", None, "no steady level flight at 60, 73, 93 or 119 m/s"),
+        (str(__file__), None, "test_jsbsim.py: JSBSim's models are .xml files; give one, or another --format"),
         ("dr1", None, "does not exist"),
     ],
 )
@@ -170,13 +172,26 @@ def test_what_cannot_be_read_is_one_line(model, airspeed, said):
     assert "\n" not in str(error.value)
 
 
-def test_a_model_without_wing_area_is_one_line(tmp_path):
+@pytest.mark.parametrize("airspeed", [None, 52.0])
+@pytest.mark.parametrize(
+    ("was", "is_now", "said"),
+    [
+        (
+            '<wingarea unit="FT2"> 174 <',
+            '<wingarea unit="FT2"> 0 <',
+            r"c172p.xml: wing area is 0 m\^2; it must be",
+        ),
+        ('<wingarea unit="FT2"> 174 <', '<wingarea unit="FT2"> -9 <', r"wing area is -0.836\d* m\^2; it must be above"),
+        ('<emptywt unit="LBS"> 1500 <', '<emptywt unit="LBS"> -9000 <', r"mass is -\d.* kg; it must be above zero"),
+        ('<wingspan unit="FT"> 35.8 <', '<wingspan unit="FT"> 0 <', "span is 0 m; it must be above zero"),
+    ],
+)
+def test_a_model_without_mass_or_size_is_one_line(tmp_path, airspeed, was, is_now, said):
     text = find_model("c172p").main.read_text()
-    area = '<wingarea unit="FT2"> 174 </wingarea>'
-    assert area in text
-    (tmp_path / "c172p.xml").write_text(text.replace(area, area.replace("174", "0")))
-    with pytest.raises(InputError, match=r"wing area 0 m\^2 in air of .*: no airspeed is enough; check the area"):
-        read_jsbsim(str(tmp_path / "c172p.xml"))
+    assert was in text
+    (tmp_path / "c172p.xml").write_text(text.replace(was, is_now))
+    with pytest.raises(InputError, match=said):
+        read_jsbsim(str(tmp_path / "c172p.xml"), airspeed)
 
 
 def test_a_property_that_is_not_there_is_one_line_and_no_abort(tmp_path):

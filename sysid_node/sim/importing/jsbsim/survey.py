@@ -81,6 +81,7 @@ def _survey(
     systems = [part for part in parts if part.tag != "aerodynamics"]
     start = Flight(50.0, 0.03, theta=0.03, altitude=altitude, throttle=0.5)
     stock = Program(copy_model(files, place / "stock", ()), _WATCH_RATE)
+    _check_sizes(files, stock)
     speeds = [airspeed] if airspeed is not None else default_airspeeds(stock, start)
     surfaces = find_surfaces(stock, aerodynamics, replace(start, airspeed=speeds[0]), _WATCH_RATE)
     if not surfaces:
@@ -111,6 +112,15 @@ def _survey(
     return survey, program, aerodynamics
 
 
+def _check_sizes(files: ModelFiles, program: Program) -> None:
+    """Raise InputError where the mass or a size is none."""
+    area, span, chord = program.geometry
+    sizes = {"mass": (program.mass, "kg"), "wing area": (area, "m^2"), "span": (span, "m"), "chord": (chord, "m")}
+    for name, (value, unit) in sizes.items():
+        if not value > 0.0:
+            raise InputError(f"model {files.label}: {name} is {value:g} {unit}; it must be above zero; correct it")
+
+
 def _steady(
     files: ModelFiles, program: Program, surfaces: Sequence[JsbsimSurface], states: list[Flight]
 ) -> SteadyFlight:
@@ -118,7 +128,7 @@ def _steady(
         found = find_trim(program, surfaces, state)
         if found is not None:
             return found
-    raise no_trim(files.name, states[0].airspeed)
+    raise no_trim(files.name, [state.airspeed for state in states])
 
 
 def _usual_signs(program: Program, surfaces: Sequence[JsbsimSurface], steady: SteadyFlight) -> list[JsbsimSurface]:
