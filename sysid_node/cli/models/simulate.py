@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 #: Rate of the integration, Hz; raised to the IMU's where that is higher. Commands that are held jump within a step, so
 #: that their time is right to half of it.
 _RATE, _HELD_RATE = 200.0, 1000.0
+#: Height above the ground (m) where none is given, for turbulence.
+_HEIGHT = 100.0
 #: Failures that reduce the effect of a surface; a stuck surface does so relative to its command.
 LOSSES = ("control_effectiveness_loss", "stuck_surface")
 
@@ -58,7 +60,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add("--duration", type=float, help="s (default: until 3 s after the manoeuvre; 60 s without one)")
     add("--airspeed", type=float, help="m/s (default: the aircraft's reference)")
     add("--turbulence", default="none", help="none, light, moderate or severe (default: none)")
-    add("--height", type=float, default=100.0, help="m above the ground, for turbulence (default: 100)")
+    add("--height", type=float, default=_HEIGHT, help="m above the ground, for turbulence (default: 100)")
     add("--linear-gusts", action="store_true", help="turbulence without rotation of the air")
     held = parser.add_mutually_exclusive_group().add_argument
     held("--open-loop", dest="autopilot", action="store_false", help="without the autopilot")
@@ -97,8 +99,7 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
     if not 0 <= args.seed < 2**63:
         raise InputError(f"--seed {args.seed}: expected a whole number, 0 or more")
     aircraft = load_aircraft(args.aircraft)
-    if args.linear_gusts and not _turbulent(args, aircraft):
-        raise InputError("--linear-gusts: there is no turbulence that it changes; give --turbulence, or leave it out")
+    _check_gusts(args, aircraft)
     recorder = FlightSampler(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
     command_rate = args.actuator_rate if args.surfaces == "commanded" else None
     rate = max(_HELD_RATE if command_rate else _RATE, args.rate, command_rate or 0.0)
@@ -128,10 +129,17 @@ def _beside(recorder: FlightSampler, sortie: Sortie) -> dict[str, JointStream]:
     return {POSITIONS: replace(recorder, surfaces="measured").record(sortie).actuators}
 
 
-def _turbulent(args: argparse.Namespace, aircraft: Aircraft) -> bool:
-    """Whether the air is turbulent, by option, effect or aircraft file."""
+def _check_gusts(args: argparse.Namespace, aircraft: Aircraft) -> None:
+    """Raise InputError where an option would change turbulence that is there neither by option, effect nor file.
+
+    The usual height is no such option: the command that a flight's truth holds states every default.
+    """
     stated = any(effect.partition(":")[0].strip() == "turbulence" for effect in args.effect)
-    return args.turbulence != "none" or stated or "turbulence" in aircraft.effects
+    if args.turbulence != "none" or stated or "turbulence" in aircraft.effects:
+        return
+    said = "--linear-gusts" if args.linear_gusts else f"--height {args.height:g}" if args.height != _HEIGHT else ""
+    if said:
+        raise InputError(f"{said}: there is no turbulence that it changes; give --turbulence, or leave it out")
 
 
 def _plan(args: argparse.Namespace, simulator: Simulator, command_rate: float) -> Manoeuvre | None:

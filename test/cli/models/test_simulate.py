@@ -124,6 +124,7 @@ def test_the_truth_of_a_failure(tmp_path, effects, surfaces, begin, changes):
         (["--turbulence", "biblical"], "expected one of none, light"),
         (["--airspeed", "2"], "no steady flight at 2 m/s"),
         (["--height", "-5"], "expected more than 0"),
+        (["--height", "50"], "--height 50: there is no turbulence that it changes"),
         (["--linear-gusts"], "there is no turbulence that it changes; give --turbulence, or leave it out"),
         (["--manoeuvre", "3211:throttle:amplitude=0.2"], "throttle reaches -0.05616 at 2.50 s, but cdrw allows 0 to 1"),
         (["--manoeuvre", "3211:elevator:width=0.005"], "steps of 0.005 s cannot be drawn at 100 Hz"),
