@@ -124,7 +124,7 @@ class Targets:
 
     def _summary(self, place: Path, rng: random.Random) -> list[str]:
         summary = self._damaged_text(place, rng, "run/summary.json", "summary.json")
-        return ["export", summary, "--format", rng.choice(FORMATS), "--out", str(place / "model")]
+        return ["export", summary, "--aircraft", "cdrw", "--format", rng.choice(FORMATS), "--out", str(place / "model")]
 
     def _model(self, place: Path, rng: random.Random) -> list[str]:
         form = rng.choice(FORMATS)

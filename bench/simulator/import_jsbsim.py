@@ -28,7 +28,7 @@ from sysid_node.sim import Simulator
 from sysid_node.sim.importing.jsbsim.files import copy_model, jsbsim_root
 from sysid_node.sim.importing.jsbsim.program import Program
 from sysid_node.sim.importing.jsbsim.read import JsbsimModel, read_model
-from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS
+from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, properties_at
 
 Array = NDArray[np.float64]
 
@@ -114,10 +114,10 @@ def fly_there(model: JsbsimModel, deflections: Array, *, own: bool) -> Array:
         program = Program(copy_model(model.files, Path(place), moved), RATE * SUBSTEPS)
 
     def driven(row: Array) -> dict[str, float]:
-        found: dict[str, float] = {}
-        for surface, value in zip(model.surfaces, row.tolist(), strict=True):
-            found |= {COMMANDS[surface.name]: surface.command_for(value)} if own else surface.at(value)
-        return found
+        given = {surface.name: value for surface, value in zip(model.surfaces, row.tolist(), strict=True)}
+        if not own:
+            return properties_at(model.surfaces, given)
+        return {COMMANDS[surface.name]: surface.command_for(given[surface.name]) for surface in model.surfaces}
 
     program.put(model.steady.state, driven(deflections[0]))
     program.step(round(3.0 * RATE * SUBSTEPS) if own else 2)  # servos come to rest on the trim

@@ -53,19 +53,11 @@ def load_aircraft(name_or_path: str | Path) -> Aircraft:
     return parse_aircraft(text, str(path))
 
 
-def named_aircraft(name: str) -> Aircraft:
-    """The aircraft that comes with the package, by its name, which is never taken for a path.
-
-    Raises InputError where there is none.
-    """
-    return load_aircraft(_shipped(name))
-
-
 def parse_aircraft(text: str, file: str = "<text>") -> Aircraft:
     """The aircraft that a YAML text describes; ``file`` is the name that errors give. Raises InputError.
 
-    Inertias that no rigid body has are an error; where the file is ``ideal`` they are a warning (``ModelWarning``), and
-    so are values that no aircraft has, whatever the file.
+    Inertias that no rigid body has and sizes that do not go together are an error; where the file is ``ideal`` they are
+    a warning (``ModelWarning``), and so are values that no aircraft has, whatever the file.
     """
     fields = parse_document(text, file).fields(_REQUIRED, optional=_OPTIONAL)
     quantities = Quantities()
@@ -78,7 +70,7 @@ def parse_aircraft(text: str, file: str = "<text>") -> Aircraft:
         source=fields["source"].text("text: where the numbers are from") if "source" in fields else "",
         mass=quantities.read(fields["mass"], "mass", positive("kg")),
         inertia=read_inertia(fields.get("inertia"), quantities, ideal=ideal),
-        geometry=read_geometry(fields["geometry"], quantities),
+        geometry=read_geometry(fields["geometry"], quantities, ideal=ideal),
         reference=read_reference(fields["reference"], quantities),
         controls=controls,
         derivatives=derivatives,

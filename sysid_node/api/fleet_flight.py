@@ -17,7 +17,7 @@ from sysid_node.fleet.catalogue.locations import local_copy
 from sysid_node.fleet.outcome import FleetSettings, FlightOutcome, FlightTask
 from sysid_node.flight.logs.origin import log_origin
 from sysid_node.flight.record import Array
-from sysid_node.report.files.runs.run_folder import REPORT, write_run
+from sysid_node.report.files.runs.run_folder import REPORT, write_aircraft, write_run
 
 #: Hz at which a fleet's replays estimate: what its result holds is the estimate at the end.
 PUBLISH_RATE = 1.0
@@ -97,7 +97,12 @@ def _replayed(flight: FlightFile, settings: FleetSettings) -> _Estimated:
     values, valid = np.array([row.value for row in rows]), np.array([row.valid for row in rows], bool)
     parts = (covariance.total, covariance.statistical)
     seconds = found.run.data.seconds
-    return _known(seconds, covariance.names, values, *parts, valid, lambda folder: write_run(folder, found.run))
+
+    def write(folder: Path) -> None:
+        write_run(folder, found.run)
+        write_aircraft(folder, found.aircraft)
+
+    return _known(seconds, covariance.names, values, *parts, valid, write)
 
 
 def _identified(flight: FlightFile, settings: FleetSettings) -> _Estimated:

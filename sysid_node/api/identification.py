@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from sysid_node.aircraft.model import Aircraft
 from sysid_node.api.compiled_programs import release_compiled_programs
 from sysid_node.api.estimated_run import EstimatedRun
 from sysid_node.api.flight_file import FlightFile, read_alike
@@ -16,7 +17,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.truth import read_truth
 from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.files.runs.batch_tables import write_batch_tables
-from sysid_node.report.files.runs.run_folder import REPORT, write_run
+from sysid_node.report.files.runs.run_folder import REPORT, write_aircraft, write_run
 from sysid_node.report.results.from_identification import identification_result
 from sysid_node.report.results.run_result import RunResult
 
@@ -27,10 +28,12 @@ class BatchIdentification(EstimatedRun):
 
     run: RunResult
     identification: Identification
+    aircraft: Aircraft
 
     def write(self, folder: Path) -> None:
         """Write what ``sysid identify`` writes into a folder that holds nothing else. Raises InputError."""
         write_run(folder, self.run)
+        write_aircraft(folder, self.aircraft)
         write_batch_tables(folder, self.identification)
 
     def save(self, folder: str | Path, *, force: bool = False) -> Path:
@@ -80,4 +83,4 @@ def identify(
     found = identify_records(method, aircraft, records, chosen, held_out)
     tell(0.9, "spectra")
     result = identification_result(aircraft, records, found, chosen, read_truth(flights[0].path))
-    return BatchIdentification(result, found)
+    return BatchIdentification(result, found, aircraft)

@@ -39,7 +39,7 @@ from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import AZ, LIFT, Estimates
 from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.files.runs.estimates_bag import write_estimates
-from sysid_node.report.files.runs.run_folder import REPORT, write_run
+from sysid_node.report.files.runs.run_folder import REPORT, write_aircraft, write_run
 from sysid_node.report.results.from_replay import replay_result
 from sysid_node.report.results.recorded_samples import RecordedSamples
 from sysid_node.report.results.run_result import RunResult
@@ -113,11 +113,12 @@ class Replay(EstimatedRun):
         return Path(folder) / REPORT
 
     def write(self, folder: Path) -> None:
-        """Write summary.json, the tables, report.html and the bag of all estimates into an empty folder.
+        """Write summary.json, the aircraft, tables, report.html and the bag of all estimates into an empty folder.
 
         Raises InputError where it cannot be written.
         """
         write_run(folder, self.run)
+        write_aircraft(folder, self.aircraft)
         write_estimates(
             folder / ESTIMATES_BAG,
             self.history,

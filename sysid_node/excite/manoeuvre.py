@@ -52,6 +52,25 @@ def control_limits(aircraft: Aircraft) -> dict[str, float]:
     return limits
 
 
+def check_thrust(manoeuvre: Manoeuvre, aircraft: Aircraft, thrust: Array) -> None:
+    """Raise InputError where a commanded thrust (N,), N, trim included, passes the throttle's limits; in its own unit.
+
+    The throttle is never clipped, because the manoeuvre would be another one.
+    """
+    throttle = aircraft.throttle
+    if throttle is None:
+        return
+    share = thrust / (throttle.max_thrust or 1.0)
+    high = 1.0 if throttle.max_thrust else np.inf
+    beyond = np.maximum(-share, share - high)
+    worst = int(beyond.argmax())
+    if beyond[worst] > 1e-9:
+        raise InputError(
+            f"manoeuvre {manoeuvre.spec!r}: trim included, {THROTTLE} reaches {share[worst]:.4g} at "
+            f"{manoeuvre.time[worst]:.2f} s, but {aircraft.name} allows 0 to {high:g}; lower the amplitude"
+        )
+
+
 def check_limits(manoeuvre: Manoeuvre, aircraft: Aircraft) -> None:
     """Raises InputError, naming control, time and limit, where a deflection from trim passes the control's limit."""
     for name, limit in control_limits(aircraft).items():

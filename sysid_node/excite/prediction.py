@@ -17,7 +17,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.errors import InputError
 from sysid_node.excite.information import FisherInformation, eliminate, fisher
-from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre
+from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre, check_thrust
 from sysid_node.excite.segment import ManoeuvreSegment, draw_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import RolloutInputs, SimulatedFlight, Simulator
@@ -167,8 +167,7 @@ def _check_travel(aircraft: Aircraft, manoeuvre: Manoeuvre, commands: Array) -> 
     limits = {
         name: (-(control.limit or np.inf), control.limit or np.inf) for name, control in aircraft.controls.items()
     }
-    if aircraft.throttle is not None:
-        limits["thrust"] = (0.0, aircraft.throttle.max_thrust or np.inf)
+    check_thrust(manoeuvre, aircraft, commands[:, -1])
     for i, (name, (low, high)) in enumerate(limits.items()):
         beyond = np.maximum(low - commands[:, i], commands[:, i] - high)
         worst = int(beyond.argmax())

@@ -21,6 +21,9 @@ TAIL = 3.0
 
 _MOST_SAMPLES = 5_000_000
 
+#: Samples of the shortest step.
+_STEP_SAMPLES = 2
+
 
 @dataclass(frozen=True)
 class ManoeuvreSegment:
@@ -88,6 +91,17 @@ def draw_manoeuvre(
     return manoeuvre
 
 
+def check_steps(segments: Sequence[ManoeuvreSegment], rate: float) -> None:
+    """Raise InputError where a step is shorter than two samples at a rate (Hz): it would be drawn as another one."""
+    for segment in segments:
+        width = segment.values.get("width")
+        if width is not None and width * rate < _STEP_SAMPLES - 1e-9:
+            raise InputError(
+                f"manoeuvre {segment.text()!r}: steps of {width:g} s cannot be drawn at {rate:g} Hz; make them at "
+                f"least {_STEP_SAMPLES / rate:g} s long"
+            )
+
+
 def _time_base(spec: str, segments: Sequence[ManoeuvreSegment], rate: float, duration: float | None) -> Array:
     end = max(segment.end for segment in segments)
     total = end + TAIL if duration is None else duration
@@ -102,4 +116,5 @@ def _time_base(spec: str, segments: Sequence[ManoeuvreSegment], rate: float, dur
         raise InputError(
             f"manoeuvre {spec!r}: {highest:g} Hz cannot be drawn at {rate:g} Hz; sample at least twice as fast"
         )
+    check_steps(segments, rate)
     return np.asarray(np.arange(round(total * rate) + 1) / rate)

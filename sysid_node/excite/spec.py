@@ -23,41 +23,56 @@ Array = NDArray[np.float64]
 PAUSE = 2.0
 #: Share of a control's limit that is its amplitude, where none is given.
 DEFAULT_SHARE = 0.15
+#: Share of the throttle's way from level flight to its nearer end that its amplitude is at most, where none is given.
+_ROOM = 0.9
 
 #: A plus sign joins segments where a kind follows it; in a number such as 1e+1 it does not.
 _JOIN = re.compile(rf"\+(?=\s*(?:{'|'.join(KINDS)})\s*(?::|\+|$))")
 
 
 def parse_manoeuvre(
-    spec: str | Sequence[str], aircraft: Aircraft, rate: float = 100.0, duration: float | None = None
+    spec: str | Sequence[str],
+    aircraft: Aircraft,
+    rate: float = 100.0,
+    duration: float | None = None,
+    airspeed: float | None = None,
 ) -> Manoeuvre:
     """The manoeuvre that a spec, or several flown together, describes for this aircraft.
 
     Sampled at ``rate`` (Hz) for ``duration`` (s; until 3 s after the last segment where it is None). Raises InputError
     (one line) for a spec that is wrong, a control that the aircraft does not have, or a deflection beyond its limit.
+    ``airspeed`` is as in ``parse_segments``.
     """
-    return draw_manoeuvre(parse_segments(spec, aircraft), aircraft, rate, duration)
+    return draw_manoeuvre(parse_segments(spec, aircraft, airspeed), aircraft, rate, duration)
 
 
-def parse_segments(spec: str | Sequence[str], aircraft: Aircraft) -> tuple[ManoeuvreSegment, ...]:
-    """The segments of a spec or of several, checked. Raises InputError."""
+def parse_segments(
+    spec: str | Sequence[str], aircraft: Aircraft, airspeed: float | None = None
+) -> tuple[ManoeuvreSegment, ...]:
+    """The segments of a spec or of several, checked. Raises InputError.
+
+    The throttle's amplitude, where none is given, stays within what level flight at ``airspeed`` (m/s; None: the
+    reference) leaves.
+    """
     texts = [spec] if isinstance(spec, str) else list(spec)
     parts = (part.strip() for text in texts for part in _JOIN.split(text))
-    return tuple(segment for part in parts for segment in _term(part, aircraft))
+    return tuple(segment for part in parts for segment in _term(part, aircraft, airspeed))
 
 
-def _term(text: str, aircraft: Aircraft) -> list[ManoeuvreSegment]:
+def _term(text: str, aircraft: Aircraft, airspeed: float | None) -> list[ManoeuvreSegment]:
     """The segments of one term; without controls it moves all surfaces, in turn unless its inputs are orthogonal."""
     kind, _, rest = text.partition(":")
     kind = kind.strip()
     if kind not in KINDS:
         raise _error(text, f"{kind!r} is no kind of manoeuvre; expected one of {', '.join(KINDS)}", kind, KINDS)
     names, _, settings = ("", "", rest) if "=" in rest.partition(":")[0] else rest.partition(":")
-    segment = _segment(text, kind, _controls(text, names, aircraft), settings, aircraft)
+    segment = _segment(text, kind, _controls(text, names, aircraft), settings, aircraft, airspeed)
     return [segment] if names or KINDS[kind].orthogonal else _in_turn(segment)
 
 
-def _segment(text: str, kind: str, controls: tuple[str, ...], settings: str, aircraft: Aircraft) -> ManoeuvreSegment:
+def _segment(
+    text: str, kind: str, controls: tuple[str, ...], settings: str, aircraft: Aircraft, airspeed: float | None
+) -> ManoeuvreSegment:
     given = _settings(text, settings)
     known = {**KINDS[kind].keys, **COMMON_KEYS}
     expected = dict.fromkeys(("amplitude", *known))
@@ -66,7 +81,12 @@ def _segment(text: str, kind: str, controls: tuple[str, ...], settings: str, air
             raise _error(text, f"{key!r} is no key of {kind}; expected {', '.join(expected)}", key, expected)
     values = {key: _number(text, key, given.get(key), default) for key, default in known.items()}
     _check(text, values)
-    return ManoeuvreSegment(kind, controls, _amplitude(text, given.get("amplitude"), controls, aircraft), values)
+    said = given.get("amplitude")
+    if said is None:
+        return ManoeuvreSegment(
+            kind, controls, tuple(_usual_amplitude(text, control, aircraft, airspeed) for control in controls), values
+        )
+    return ManoeuvreSegment(kind, controls, _amplitude(text, said, controls), values)
 
 
 def _in_turn(segment: ManoeuvreSegment) -> list[ManoeuvreSegment]:
@@ -132,9 +152,7 @@ def _number(text: str, key: str, value: str | None, known: ManoeuvreKey) -> floa
     return number
 
 
-def _amplitude(text: str, value: str | None, controls: tuple[str, ...], aircraft: Aircraft) -> tuple[float, ...]:
-    if value is None:
-        return tuple(_usual_amplitude(text, control, aircraft) for control in controls)
+def _amplitude(text: str, value: str, controls: tuple[str, ...]) -> tuple[float, ...]:
     count = len(controls)
     amplitude = tuple(_float(text, "amplitude", part) for part in value.split(","))
     if len(amplitude) == 1:
@@ -144,11 +162,26 @@ def _amplitude(text: str, value: str | None, controls: tuple[str, ...], aircraft
     return amplitude
 
 
-def _usual_amplitude(text: str, control: str, aircraft: Aircraft) -> float:
+def _usual_amplitude(text: str, control: str, aircraft: Aircraft, airspeed: float | None) -> float:
     limit = control_limits(aircraft)[control]
     if not math.isfinite(limit):
         raise _error(text, f"amplitude is missing, and {aircraft.name} gives {control} no limit to take a share of")
-    return float(f"{DEFAULT_SHARE * limit:.3g}")
+    size = DEFAULT_SHARE * limit
+    if control == THROTTLE:
+        size = min(size, _ROOM * _throttle_left(aircraft, airspeed))
+    return float(f"{size:.3g}")
+
+
+def _throttle_left(aircraft: Aircraft, airspeed: float | None) -> float:
+    """How far the throttle can be moved both ways from level flight (share of full); 1 where there is none."""
+    from sysid_node.dynamics.handbook.equations import Equations  # noqa: PLC0415  # SciPy takes its time
+    from sysid_node.dynamics.handbook.trim import level_trim  # noqa: PLC0415
+
+    trim = level_trim(Equations(aircraft), aircraft.reference.airspeed if airspeed is None else airspeed)
+    if trim is None or aircraft.throttle is None or aircraft.throttle.max_thrust is None:
+        return 1.0
+    share = trim.thrust / aircraft.throttle.max_thrust
+    return min(share, 1.0 - share) if 0.0 < share < 1.0 else 1.0
 
 
 def _check(text: str, values: Mapping[str, float]) -> None:

@@ -119,7 +119,7 @@ def test_a_throttle_manoeuvre_moves_thrust(predictor):
     manoeuvre = parse_manoeuvre("doublet:throttle:amplitude=0.1", CDRW, RATE, DURATION)
     commands = predictor.commands(manoeuvre)
     assert np.ptp(commands[:, -1]) == pytest.approx(2 * 0.1 * 30.0)
-    with pytest.raises(InputError, match=r"thrust reaches -\d.* but cdrw allows 0 to 30"):
+    with pytest.raises(InputError, match=r"throttle reaches -0.05\d* at .* but cdrw allows 0 to 1;"):
         predictor.commands(parse_manoeuvre("doublet:throttle:amplitude=0.2", CDRW, RATE, DURATION))
     assert np.ptp(commands[:, :-1]) == pytest.approx(np.ptp(predictor.trim.command[:-1]))
 

@@ -40,3 +40,11 @@ def test_text_gives_the_segment_back(kind):
     later = moved(segment, 7.25)
     assert later.values["start"] == 7.25
     assert draw_manoeuvre([later], CDRW).spec == later.text()
+
+
+@pytest.mark.parametrize(("width", "rate"), [(0.001, 100.0), (0.019, 100.0), (0.039, 50.0)])
+def test_steps_shorter_than_two_samples_are_refused(width, rate):
+    """They would be drawn as steps of another length, or not at all."""
+    with pytest.raises(InputError, match=rf"steps of {width:g} s cannot be drawn at {rate:g} Hz; make them at least"):
+        parse_manoeuvre(f"3211:elevator:amplitude=0.05:width={width}", CDRW, rate)
+    assert parse_manoeuvre(f"3211:elevator:amplitude=0.05:width={2 / rate}", CDRW, rate).moved == ("elevator",)

@@ -80,7 +80,9 @@ def test_a_mistake_gets_one_line(spec, expected):
 
 def test_without_an_amplitude_it_is_a_share_of_the_limit():
     (segment,) = parse_segments("doublet:elevator,throttle:width=0.3", CDRW)
-    assert segment.amplitude == (0.0525, 0.15)
+    assert segment.amplitude == (0.0525, 0.129)  # nine tenths of the 0.1438 of full throttle in level flight
+    (fast,) = parse_segments("doublet:throttle", CDRW, 40.0)
+    assert fast.amplitude == (0.15,)  # level flight at 40 m/s takes 0.4 of full throttle: there is room
     unlimited = replace(CDRW, throttle=replace(CDRW.throttle, max_thrust=None))
     with pytest.raises(InputError, match=r"amplitude is missing, and cdrw gives throttle no limit"):
         parse_segments("doublet:throttle", unlimited)

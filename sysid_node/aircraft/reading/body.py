@@ -49,8 +49,12 @@ def _check_inertia(entry: DocumentEntry, inertia: Inertia, *, ideal: bool) -> No
         raise entry.error(f"no rigid body has Ixz^2 = {square:g} >= Ixx Izz = {inertia.Ixx * inertia.Izz:g}; check Ixz")
 
 
-def read_geometry(entry: DocumentEntry, quantities: Quantities) -> Geometry:
-    """The reference area, span and chord. Raises InputError."""
+def read_geometry(entry: DocumentEntry, quantities: Quantities, *, ideal: bool = False) -> Geometry:
+    """The reference area, span and chord. Raises InputError.
+
+    Sizes that do not go together are an error; where the file is ``ideal`` they are a warning, because a simulator's
+    coefficients are what they are by its own sizes.
+    """
     fields = entry.fields({"S": "the reference area in m^2", "b": "the span in m", "cbar": "the mean chord in m"})
     S, b, cbar = (
         quantities.read(fields[k], f"geometry.{k}", positive(unit))
@@ -58,7 +62,10 @@ def read_geometry(entry: DocumentEntry, quantities: Quantities) -> Geometry:
     )
     # S is b times a mean chord; whichever mean was meant, a factor of 3 shows a wrong unit.
     if not 1 / 3 < S / (b * cbar) < 3:
-        raise entry.error(f"S = {S:g} m^2 does not go with b cbar = {b * cbar:g} m^2; check the units")
+        problem = entry.error(f"S = {S:g} m^2 does not go with b cbar = {b * cbar:g} m^2; check the units")
+        if not ideal:
+            raise problem
+        warnings.warn(f"{problem}; they are taken as the simulator takes them", ModelWarning, stacklevel=2)
     return Geometry(S, b, cbar)
 
 

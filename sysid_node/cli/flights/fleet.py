@@ -57,8 +57,10 @@ def run(args: argparse.Namespace) -> None:
     _check_numbers(args)
     from sysid_node.api import fleet_run  # noqa: PLC0415  # Dask takes its time
     from sysid_node.fleet.catalogue.reading import read_catalogue  # noqa: PLC0415
+    from sysid_node.fleet.engine.cluster import check_memory  # noqa: PLC0415
     from sysid_node.fleet.engine.running import Limits  # noqa: PLC0415
 
+    check_memory(args.memory)
     settings = _settings(args)
     catalogue = read_catalogue(args.catalogue, args.aircraft)
     if args.dry_run:

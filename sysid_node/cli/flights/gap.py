@@ -44,6 +44,8 @@ def run(args: argparse.Namespace) -> None:
     from sysid_node.api.gap_diagnosis import diagnose  # noqa: PLC0415  # JAX takes its time
     from sysid_node.report.files.gap_folder import UNFINISHED  # noqa: PLC0415
 
+    for paths in (args.bags, args.holdout, args.simulated):
+        options.refuse_twice(paths)
     flights, holdout, simulated = (
         [load(path, args.aircraft, topics=args.topic, body_frame=args.body_frame) for path in paths]
         for paths in (args.bags, args.holdout, args.simulated)

@@ -37,7 +37,7 @@ from sysid_node.online.alignment.in_pieces import AlignedSamples, align_streams
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
 from sysid_node.report.files.outputs.output_folder import output_folder
-from sysid_node.report.files.runs.run_folder import write_run
+from sysid_node.report.files.runs.run_folder import write_aircraft, write_run
 from sysid_node.report.results.from_replay import replay_result
 from sysid_node.report.results.recorded_samples import RecordedSamples
 from sysid_node.report.results.run_result import RunResult
@@ -100,6 +100,11 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     return parser
 
 
+def _write(folder: Path, result: RunResult, aircraft: Aircraft) -> None:
+    write_run(folder, result)
+    write_aircraft(folder, aircraft)
+
+
 def run(args: argparse.Namespace) -> None:
     """Plays and identifies the flight, then writes the report and prints a summary."""
     if not args.rate > 0.0:
@@ -112,7 +117,7 @@ def run(args: argparse.Namespace) -> None:
     with output_folder(args.out, "demo", inputs=inputs, force=args.force, working=logs) as out:
         with viewer_beside(args.aircraft, args.view, args.out):
             follower, history = _fly(flight, args.aircraft, args.rate, args.out)
-        out.publish(lambda folder: write_run(folder, _result(flight, follower, history)))
+        out.publish(lambda folder: _write(folder, _result(flight, follower, history), aircraft))
     print(_summary(flight, history[-1]))
     if flight.from_commands:
         print(_with_positions(flight, history[-1]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.shared import options
 from sysid_node.dynamics.handbook.handbook import Handbook, handbook
+from sysid_node.dynamics.handbook.unusual import Finding, findings_without_flight
 from sysid_node.errors import InputError
 from sysid_node.online.types import Estimates
 from sysid_node.report.files.handbook_folder import write_handbook
@@ -40,7 +42,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 def run(args: argparse.Namespace) -> None:
     """Prints the handbook, and writes it where ``--out`` is given."""
     aircraft = load_aircraft(args.aircraft)
-    book = handbook(aircraft)
+    book = _handbook(args, aircraft)
     expected = _expected(aircraft) if args.budget else "it was not asked for"
     if args.out is not None:
         inputs = options.inputs_of([], args.aircraft)
@@ -50,6 +52,16 @@ def run(args: argparse.Namespace) -> None:
         _show(book, expected)
         if args.out is not None:
             print(f"\nreport: {args.out / 'report.html'}")
+
+
+def _handbook(args: argparse.Namespace, aircraft: Aircraft) -> Handbook:
+    """The handbook. Where there is none, raises InputError after the checks that need no flight are shown."""
+    try:
+        return handbook(aircraft)
+    except InputError as error:
+        if not args.quiet:
+            _show_findings(Console(highlight=False, soft_wrap=True), findings_without_flight(aircraft))
+        raise InputError(f"{args.aircraft}: {error}") from error
 
 
 def _expected(aircraft: Aircraft) -> Estimates | str:
@@ -80,9 +92,13 @@ def _show(book: Handbook, expected: Estimates | str) -> None:
         _print(console, section.budget_table(expected))
     if book.left_out:
         console.print(f"not part of these numbers: {', '.join(book.left_out)}", markup=False)
-    unusual = [finding for finding in book.findings if finding.unusual]
-    count = f"{len(unusual)} of {len(book.findings)} values look unusual" if unusual else ""
-    console.print(f"\n{count or f'none of {len(book.findings)} checked values looks unusual'}", style="bold")
+    _show_findings(console, book.findings)
+
+
+def _show_findings(console: Console, findings: Sequence[Finding]) -> None:
+    unusual = [finding for finding in findings if finding.unusual]
+    count = f"{len(unusual)} of {len(findings)} values look unusual" if unusual else ""
+    console.print(f"\n{count or f'none of {len(findings)} checked values looks unusual'}", style="bold")
     for finding in unusual:
         text = f"  {finding.name} = {number(finding.value)} {finding.unit} (usual: {finding.usual}): {finding.meaning}"
         console.print(f"{text} [{finding.source}]", style="yellow", markup=False)

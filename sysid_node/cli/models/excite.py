@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
 
+#: Trials of the optimiser, where none are given.
+_EVALUATIONS = 200
+
+
 def add_parser(commands: Commands) -> argparse.ArgumentParser:
     """The command's arguments."""
     parser = commands.add_parser("excite", help="design a manoeuvre and predict its accuracy", description=__doc__)
@@ -38,7 +42,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add("--airspeed", type=float, help="m/s (default: the aircraft's reference)")
     add("--open-loop", action="store_true", help="without the autopilot that holds attitude and airspeed")
     add("--optimise", action="store_true", help="optimise amplitudes and timing for the smallest predicted errors")
-    add("--evaluations", type=int, default=200, help="trials of the optimiser (default: 200)")
+    add("--evaluations", type=int, help=f"trials of --optimise (default: {_EVALUATIONS})")
     add("--envelope", action="append", default=[], metavar="NAME=VALUE", help="limit of a departure from trim")
     add("--quiet", action="store_true", help="print nothing")
     return parser
@@ -47,6 +51,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 def run(args: argparse.Namespace) -> None:
     """Predicts, optimises with ``--optimise``, and writes the results."""
     from sysid_node.report.files.manoeuvre_folder import write_manoeuvre  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.report.sections.manoeuvre.plan import beyond_envelope  # noqa: PLC0415
 
     inputs = options.inputs_of([], args.aircraft)
     with output_folder(args.out, "excite", inputs=inputs, force=args.force) as out:
@@ -54,6 +59,8 @@ def run(args: argparse.Namespace) -> None:
         out.publish(lambda folder: write_manoeuvre(folder, result))
     if not args.quiet:
         print(result.prediction.manoeuvre.spec)
+        if exceeded := beyond_envelope(result):
+            print(f"The flight exceeds the envelope in {', '.join(exceeded)}.")
         print(args.out / "report.html")
 
 
@@ -64,16 +71,24 @@ def design(args: argparse.Namespace) -> ManoeuvreResult:
     from sysid_node.excite.spec import parse_segments  # noqa: PLC0415
     from sysid_node.report.results.manoeuvre_result import ManoeuvreResult  # noqa: PLC0415
 
-    if not 10 <= args.evaluations <= 10_000:
-        raise InputError(f"--evaluations {args.evaluations}: expected 10 to 10000")
+    _check_evaluations(args)
     aircraft, envelope = load_aircraft(args.aircraft), parse_envelope(args.envelope)
-    segments = parse_segments(args.manoeuvre, aircraft)
+    segments = parse_segments(args.manoeuvre, aircraft, args.airspeed)
     plan = draw_manoeuvre(segments, aircraft, args.rate, args.duration)
     with progress_bar("excite", quiet=args.quiet) as progress:
         predictor = Predictor(aircraft, args.rate, args.airspeed, autopilot=not args.open_loop)
         if not args.optimise:
             return ManoeuvreResult(aircraft, predictor.predict(plan), envelope, not args.open_loop)
         return _optimised(args, predictor, segments, plan, envelope, progress)
+
+
+def _check_evaluations(args: argparse.Namespace) -> None:
+    if args.evaluations is None:
+        return
+    if not 10 <= args.evaluations <= 10_000:
+        raise InputError(f"--evaluations {args.evaluations}: expected 10 to 10000")
+    if not args.optimise:
+        raise InputError(f"--evaluations {args.evaluations}: nothing is optimised; give --optimise, or leave it out")
 
 
 def _optimised(
@@ -87,8 +102,9 @@ def _optimised(
     from sysid_node.excite.optimise import optimise  # noqa: PLC0415
     from sysid_node.report.results.manoeuvre_result import ManoeuvreResult  # noqa: PLC0415
 
-    tell = lambda count, _: progress(min(count / args.evaluations, 1.0), "optimising")  # noqa: E731
-    optimum = optimise(predictor, segments, plan.duration, envelope, args.evaluations, tell)
+    trials = args.evaluations or _EVALUATIONS
+    tell = lambda count, _: progress(min(count / trials, 1.0), "optimising")  # noqa: E731
+    optimum = optimise(predictor, segments, plan.duration, envelope, trials, tell)
     return ManoeuvreResult(predictor.aircraft, optimum.best, envelope, not args.open_loop, optimum)
 
 

@@ -9,11 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sysid_node.aircraft.load import load_aircraft, named_aircraft
+from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft, Derivative
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.report.files.outputs.output_file import check_file, write_file
+from sysid_node.report.files.outputs.output_folder import AIRCRAFT, WRITTEN
 
 if TYPE_CHECKING:
     from sysid_node.sim.export.exported import Exported
@@ -31,7 +32,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser = commands.add_parser("export", help="write an estimate as another simulator's model", description=__doc__)
     estimate = "summary.json of a run, its folder, or an aircraft (file or name)"
     parser.add_argument("estimate", metavar="ESTIMATE", help=estimate)
-    parser.add_argument("--aircraft", help="file or name (default: the one that the estimate names)")
+    parser.add_argument("--aircraft", help="file or name (default: the one that the run keeps beside its estimate)")
     parser.add_argument("--format", choices=FORMATS, required=True, help="whose model")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="the file to write")
     options.add_force(parser)
@@ -60,10 +61,9 @@ def run(args: argparse.Namespace) -> None:
     )
     check_file(args.out, inputs, MARK, force=args.force)
     summary = _summary(args.estimate)
-    if args.aircraft or not summary:
-        aircraft = load_aircraft(args.aircraft or args.estimate)
-    else:
-        aircraft = named_aircraft(summary["aircraft"])
+    if args.aircraft and not summary:
+        raise InputError(f"--aircraft {args.aircraft}: {args.estimate} is an aircraft itself; give one of the two")
+    aircraft = load_aircraft(args.aircraft or (_kept_beside(args.estimate, summary) if summary else args.estimate))
     left: list[str] = []
     if summary:
         aircraft, left = with_estimates(aircraft, summary["derivatives"])
@@ -75,6 +75,23 @@ def run(args: argparse.Namespace) -> None:
         print(f"{args.out}: {aircraft.name} for {args.format}{kept}{lost}")
         for line in exported.left_out:
             print(f"- {line}")
+
+
+def _kept_beside(estimate: str, summary: Mapping[str, Any]) -> Path:
+    """The aircraft file that a run keeps beside its summary. Raises InputError where there is none.
+
+    A name alone is not enough: another aircraft of that name may come with the package.
+    """
+    path = Path(estimate)
+    kept = (path if path.is_dir() else path.parent) / AIRCRAFT
+    written = summary.get(WRITTEN)
+    files = written.get("files") if isinstance(written, dict) else None
+    if isinstance(files, list) and AIRCRAFT in files and kept.is_file():
+        return kept
+    raise InputError(
+        f"{path}: keeps no aircraft file, and {summary['aircraft']!r:.60} may name several; "
+        "give the one that was used as --aircraft"
+    )
 
 
 def with_estimates(aircraft: Aircraft, estimates: Mapping[str, Mapping[str, Any]]) -> tuple[Aircraft, list[str]]:

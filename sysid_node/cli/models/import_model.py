@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,7 +47,7 @@ def run(args: argparse.Namespace) -> None:
     _check(args)
     imported = _read(args)
     text = _header(args, imported.notes) + dump_aircraft(imported.aircraft)
-    parse_aircraft(text, str(args.out))  # an aircraft file accepts it, or says what of the model it does not
+    _check_accepted(args, text)
     write_file(args.out, text)
     if not args.quiet:
         aircraft = imported.aircraft
@@ -56,6 +57,16 @@ def run(args: argparse.Namespace) -> None:
         print(f"{args.out}: {aircraft.name}, {parts} about {about}")
         for note in imported.notes:
             print(f"- {note}")
+
+
+def _check_accepted(args: argparse.Namespace, text: str) -> None:
+    """Raise InputError, naming the model, where an aircraft file does not accept what was read from it."""
+    out = str(args.out)
+    try:
+        parse_aircraft(text, out)
+    except InputError as error:
+        problem = re.sub(rf"^{re.escape(out)}(:\d+)?: ", "", str(error))
+        raise InputError(f"{args.model}: no aircraft file can hold it: {problem}") from error
 
 
 def _check(args: argparse.Namespace) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
 from sysid_node.flight.bag.writer import STORAGES, write_streams
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 #: Rate of the integration, Hz; raised to the IMU's where that is higher. Commands that are held jump within a step, so
 #: that their time is right to half of it.
 _RATE, _HELD_RATE = 200.0, 1000.0
+#: Height above the ground (m) where none is given, for turbulence.
+_HEIGHT = 100.0
 #: Failures that reduce the effect of a surface; a stuck surface does so relative to its command.
 LOSSES = ("control_effectiveness_loss", "stuck_surface")
 
@@ -57,10 +60,11 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     add("--duration", type=float, help="s (default: until 3 s after the manoeuvre; 60 s without one)")
     add("--airspeed", type=float, help="m/s (default: the aircraft's reference)")
     add("--turbulence", default="none", help="none, light, moderate or severe (default: none)")
-    add("--height", type=float, default=100.0, help="m above the ground, for turbulence (default: 100)")
+    add("--height", type=float, default=_HEIGHT, help="m above the ground, for turbulence (default: 100)")
     add("--linear-gusts", action="store_true", help="turbulence without rotation of the air")
-    add("--open-loop", dest="autopilot", action="store_false", help="without the autopilot")
-    add("--autopilot", action="store_true", default=True, help="hold attitude and airspeed (default)")
+    held = parser.add_mutually_exclusive_group().add_argument
+    held("--open-loop", dest="autopilot", action="store_false", help="without the autopilot")
+    held("--autopilot", action="store_true", default=True, help="hold attitude and airspeed (default)")
     add("--noise", type=float, default=1.0, help="of the aircraft file's sensor noise (default: 1)")
     add("--rate", type=float, default=200.0, help="of the IMU, Hz (default: 200)")
     add("--air-data-rate", type=float, default=100.0, help="Hz (default: 100)")
@@ -85,7 +89,8 @@ def run(args: argparse.Namespace) -> None:
 
 def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStream]]:
     """The flight and its messages, with those of ``_beside``."""
-    from sysid_node.sim.flying.recording import FlightSampler  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.excite.manoeuvre import check_thrust  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim.flying.recording import FlightSampler  # noqa: PLC0415
     from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie  # noqa: PLC0415
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
 
@@ -93,10 +98,12 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
         raise InputError(f"--height {args.height:g}: expected more than 0 and at most 20000 m above the ground")
     if not 0 <= args.seed < 2**63:
         raise InputError(f"--seed {args.seed}: expected a whole number, 0 or more")
+    aircraft = load_aircraft(args.aircraft)
+    _check_gusts(args, aircraft)
     recorder = FlightSampler(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
     command_rate = args.actuator_rate if args.surfaces == "commanded" else None
     rate = max(_HELD_RATE if command_rate else _RATE, args.rate, command_rate or 0.0)
-    simulator = Simulator(load_aircraft(args.aircraft), rate)
+    simulator = Simulator(aircraft, rate)
     conditions = SortieConditions(
         args.effect,
         args.airspeed,
@@ -108,7 +115,10 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
         rotary_gusts=not args.linear_gusts,
         command_rate=command_rate,
     )
-    sortie = fly_sortie(simulator, _deflections(simulator, args.manoeuvre, args.duration), conditions)
+    plan = _plan(args, simulator, command_rate or rate)
+    sortie = fly_sortie(simulator, _deflections(args, simulator, plan), conditions)
+    if plan is not None:
+        check_thrust(plan, aircraft, np.asarray(sortie.inputs.commands)[:, -1])
     return sortie, recorder.record(sortie), _beside(recorder, sortie)
 
 
@@ -119,15 +129,38 @@ def _beside(recorder: FlightSampler, sortie: Sortie) -> dict[str, JointStream]:
     return {POSITIONS: replace(recorder, surfaces="measured").record(sortie).actuators}
 
 
-def _deflections(simulator: Simulator, specs: list[str], duration: float | None) -> NDArray[np.float64]:
-    """Planned deflections from trim (N, controls + 1), rad and N."""
-    from sysid_node.excite.spec import parse_manoeuvre  # noqa: PLC0415
+def _check_gusts(args: argparse.Namespace, aircraft: Aircraft) -> None:
+    """Raise InputError where an option would change turbulence that is there neither by option, effect nor file.
 
+    The usual height is no such option: the command that a flight's truth holds states every default.
+    """
+    stated = any(effect.partition(":")[0].strip() == "turbulence" for effect in args.effect)
+    if args.turbulence != "none" or stated or "turbulence" in aircraft.effects:
+        return
+    said = "--linear-gusts" if args.linear_gusts else f"--height {args.height:g}" if args.height != _HEIGHT else ""
+    if said:
+        raise InputError(f"{said}: there is no turbulence that it changes; give --turbulence, or leave it out")
+
+
+def _plan(args: argparse.Namespace, simulator: Simulator, command_rate: float) -> Manoeuvre | None:
+    """The manoeuvre, of which no step is lost between commands at a rate (Hz); None where none is flown."""
+    from sysid_node.excite.segment import check_steps, draw_manoeuvre  # noqa: PLC0415
+    from sysid_node.excite.spec import parse_segments  # noqa: PLC0415
+
+    duration = args.duration
     if duration is not None and not 0.1 <= duration <= 36000.0:
         raise InputError(f"--duration {duration:g}: expected 0.1 to 36000 s")
-    if not specs:
-        return np.zeros((round((duration or 60.0) * simulator.rate) + 1, len(simulator.commands)))
-    manoeuvre = parse_manoeuvre(specs, simulator.aircraft, simulator.rate, duration)
+    if not args.manoeuvre:
+        return None
+    segments = parse_segments(args.manoeuvre, simulator.aircraft, args.airspeed)
+    check_steps(segments, command_rate)
+    return draw_manoeuvre(segments, simulator.aircraft, simulator.rate, duration)
+
+
+def _deflections(args: argparse.Namespace, simulator: Simulator, manoeuvre: Manoeuvre | None) -> NDArray[np.float64]:
+    """Planned deflections from trim (N, controls + 1), rad and N."""
+    if manoeuvre is None:
+        return np.zeros((round((args.duration or 60.0) * simulator.rate) + 1, len(simulator.commands)))
     return np.column_stack([manoeuvre.surfaces(), _thrust(simulator, manoeuvre)])
 
 

@@ -71,6 +71,15 @@ def inputs_of(files: Iterable[str | Path], aircraft: str | None) -> list[Path]:
     return [*found, Path(aircraft)] if aircraft and os.path.isfile(aircraft) else found  # noqa: PTH113  # any length
 
 
+def refuse_twice(flights: Iterable[Path]) -> None:
+    """Raise InputError where a flight is given twice: again it tells nothing new, and checks nothing."""
+    seen: set[Path] = set()
+    for flight in flights:
+        if (place := flight.resolve()) in seen:
+            raise InputError(f"{flight}: this flight is given twice; leave it out once")
+        seen.add(place)
+
+
 def settings_of(texts: Iterable[str], frequencies: str | None, example: str) -> dict[str, object]:
     """The settings of ``--set key=value`` and ``--frequencies``, as texts. Raises InputError with an example."""
     values: dict[str, object] = {}

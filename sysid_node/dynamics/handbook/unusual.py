@@ -9,7 +9,7 @@ The sources give the signs and the kind of values; the ranges' ends are a choice
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from sysid_node.aircraft.model import Aircraft
@@ -68,6 +68,9 @@ _DERIVATIVES: tuple[tuple[str, float, float, str, str], ...] = (
     ("Cn_{r}", -0.3, -0.003, f"rudder to the left must yaw to the left: negative; {_DEGREES} it is weak", ROSKAM),
 )
 
+#: Noise (1 sigma) of a sensor -> the largest that is usual, rad or rad/s.
+_NOISE = {"alpha": 0.05, "beta": 0.05, "attitude": 0.05, "gyro": 0.15}
+
 #: Mode -> what is compared: frequency (or the inverse of the time constant) times sqrt(span / g), and damping.
 _MODES: tuple[tuple[str, float, float, float, float], ...] = (
     ("short period", 0.8, 15.0, 0.15, 2.0),
@@ -83,8 +86,18 @@ def findings(
 
     ``slopes`` are derivatives by name at level flight, ``margin`` is the static margin as a share of the chord.
     """
-    found = [*_derivatives(aircraft, slopes), *_flight(aircraft, trim, margin), *_body(aircraft)]
+    found = [*_derivatives(aircraft, slopes), *_flight(aircraft, trim, margin), *_body(aircraft), *_units(aircraft)]
     found += _motions(aircraft, trim, modes)
+    return _sorted(found)
+
+
+def findings_without_flight(aircraft: Aircraft) -> tuple[Finding, ...]:
+    """The checks that need no level flight, for a file that has none; derivatives are as the file has them."""
+    stated = {name: derivative.value for name, derivative in aircraft.derivatives.items()}
+    return _sorted([*_derivatives(aircraft, stated), *_body(aircraft), *_units(aircraft)])
+
+
+def _sorted(found: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted((f for f in found if math.isfinite(f.value)), key=lambda finding: not finding.unusual))
 
 
@@ -143,6 +156,33 @@ def _body(aircraft: Aircraft) -> Iterator[Finding]:
         yield Finding(f"{name} over m b^2", getattr(inertia, name) / scale, low, high, "1", words, RAYMER)
     flat = inertia.Izz / (inertia.Ixx + inertia.Iyy)
     yield Finding("Izz over Ixx + Iyy", flat, 0.6, 1.0, "1", "above 1 is impossible; a flat body has 1", KLEIN)
+
+
+def _units(aircraft: Aircraft) -> Iterator[Finding]:
+    """Places, noise, joints and servos, which are often in another unit than the file's."""
+    size = max(aircraft.geometry.b, aircraft.geometry.cbar)
+    for name in ("imu", "air_data"):
+        place = math.hypot(*getattr(aircraft.sensors, name))
+        yield Finding(
+            f"distance of sensors.{name}", place, 0.0, 1.5 * size, "m", "in cm or mm, or not from the CG", CHOICE
+        )
+    throttle = aircraft.throttle
+    if throttle is not None:
+        yield Finding("throttle.arm", throttle.arm, -size, size, "m", "in cm or mm, or not from the CG", CHOICE)
+    for name, most in _NOISE.items():
+        words = "in degrees, or of a poor sensor"
+        unit = "rad/s" if name == "gyro" else "rad"
+        yield Finding(f"noise.{name}", aircraft.noise[name], 0.0, most, unit, words, CHOICE)
+    for control in aircraft.controls.values():
+        for joint, scale in control.joints.items():
+            name = f"scale of {control.name}'s joint {joint}"
+            yield Finding(name, abs(scale), 0.0, 10.0, "rad per unit", "perhaps it is 180 / pi", CHOICE)
+    effects = aircraft.effect_values()
+    for name, rate in effects.get("actuator_rate_limit", {}).items():
+        yield Finding(f"rate limit of {name}", rate, 0.1, 60.0, "rad/s", "in degrees per second", CHOICE)
+    for axis, shift in effects.get("cg_shift", {}).items():
+        chord = aircraft.geometry.cbar
+        yield Finding(f"cg_shift.{axis}", shift, -0.5 * chord, 0.5 * chord, "m", "in cm or mm", CHOICE)
 
 
 def _motions(aircraft: Aircraft, trim: LevelTrim, modes: Sequence[Mode]) -> Iterator[Finding]:

@@ -53,17 +53,23 @@ class Workers(NamedTuple):
     revive: Callable[[], None]
 
 
+def check_memory(memory: str | None) -> None:
+    """Raise InputError where the memory of a worker is given and is no size."""
+    if memory is None:
+        return
+    try:
+        dask.utils.parse_bytes(memory)
+    except ValueError:
+        raise InputError(f"--memory {memory!r}: expected a size, e.g. 2GB") from None
+
+
 @contextlib.contextmanager
 def local_workers(count: int, memory: str | None = None) -> Iterator[Workers]:
     """``count`` worker processes on this machine, each bounded to ``memory`` (as "2GB"; None: its share of all).
 
     Raises InputError where the memory is no size.
     """
-    if memory is not None:
-        try:
-            dask.utils.parse_bytes(memory)
-        except ValueError:
-            raise InputError(f"--memory {memory!r}: expected a size, e.g. 2GB") from None
+    check_memory(memory)
     _quiet()
     with dask.config.set(_SETTINGS), _silent_tracker():
         cluster = LocalCluster(

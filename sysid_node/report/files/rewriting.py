@@ -16,6 +16,7 @@ _NEEDS_THE_WORK = {
     "gap": "its report shows more than its files hold, so sysid gap alone writes it; run sysid gap again",
     "aircraft": "its report shows more than its files hold, so sysid aircraft alone writes it; run it again",
     "excite": "its report shows more than its files hold, so sysid excite alone writes it; run sysid excite again",
+    "fleet": "sysid fleet alone writes its report; run sysid fleet again: it does only what is missing or has changed",
 }
 
 
@@ -44,6 +45,8 @@ def _command_of(folder: Path) -> tuple[str, dict[str, Any]]:
         return "aircraft", {}
     if (folder / "gap.json").is_file():
         return "gap", {}
+    if (folder / "fleet.json").is_file():
+        return "fleet", {}
     try:
         content = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -26,6 +26,7 @@ from sysid_node.sim.export.gazebo.parts import joint_angles
 from sysid_node.sim.export.losses import differences, late_failures, not_held
 from sysid_node.sim.export.servos import first_order_lags, second_order_line
 from sysid_node.sim.export.steady import Coefficients, Columns, SteadyModel
+from sysid_node.sim.importing.gazebo.motion import controllers_of
 from sysid_node.sim.importing.gazebo.read import read_gazebo
 
 Array = NDArray[np.float64]
@@ -163,19 +164,21 @@ def _change_servos(copy: _Copy) -> list[str]:
             done = _change_servo(copy, joint, lagged.get(name, 0.0), limited.get(name, math.inf) * reach)
             if not done:
                 effect = "actuator_lag" if slower else "actuator_rate_limit"
-                lines.append(f"{effect}: joint {joint} has no JointPositionController against a damping")
+                why = "has no JointPositionController against a damping"
+                if not lagged.get(name) and lags.get(name):
+                    why = f"keeps its lag of {lags[name]:.3g} s; a controller against a damping cannot do without one"
+                lines.append(f"{effect}: joint {joint} {why}")
     return lines
 
 
 def _change_servo(copy: _Copy, joint: str, lag: float, rate: float) -> bool:
-    controllers = {(p.findtext("joint_name") or "").strip(): p for p in _plugins(copy, "JointPositionController")}
+    controllers = controllers_of(_plugins(copy, "JointPositionController"))
     damping = copy.root.findtext(f".//joint[@name='{joint}']/axis/dynamics/damping")
     controller = controllers.get(joint)
     if controller is None or not damping or controller.find("use_velocity_commands") is not None or not lag:
         return False
     resisting = float(damping)
-    own = float(controller.findtext("d_gain") or 0.0)
-    _set(controller, "p_gain", (resisting + own) / lag)
+    _set(controller, "p_gain", resisting / lag)
     if math.isfinite(rate):
         _set(controller, "cmd_max", rate * resisting)
         _set(controller, "cmd_min", -rate * resisting)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -16,7 +17,7 @@ from sysid_node.dynamics.attitude import euler_angles
 from sysid_node.errors import InputError
 from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model
 from sysid_node.sim.importing.jsbsim.program import FOOT, POUND, SLUG, Flight, Program
-from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, JsbsimSurface
+from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, JsbsimSurface, properties_at
 from sysid_node.sim.importing.jsbsim.survey import ModelSurvey
 
 Array = NDArray[np.float64]
@@ -83,7 +84,8 @@ class JsbsimFlyer:
         self._frames = max(round(frame_rate / rate), 1)
         self._survey, self._names = survey, tuple(aircraft.controls)
         self._surfaces = {surface.name: surface for surface in survey.surfaces}
-        held = {name for s in survey.surfaces if s.feedback for name in s.properties}
+        self._held = _held(survey.surfaces)
+        held = {name for s in self._held for name in s.properties}
         with tempfile.TemporaryDirectory(prefix="sysid-") as place:
             self.program = Program(copy_model(files, Path(place), held), rate * self._frames)
         bias = aircraft.effect_values().get("actuator_bias", {})
@@ -151,11 +153,12 @@ class JsbsimFlyer:
 
     def _driven(self, command: Array) -> dict[str, float]:
         """Properties that give a command (controls + 1,)."""
-        driven: dict[str, float] = {}
-        for name, value in zip(self._names, command.tolist(), strict=False):
-            surface = self._surfaces.get(name)
-            if surface is not None:
-                driven |= _to_surface(surface, value, self._offsets[name])
+        given = dict(zip(self._names, command.tolist(), strict=False))
+        given = {name: value + self._offsets[name] for name, value in given.items() if name in self._surfaces}
+        held = [s for s in self._held if s.name in given]
+        driven = properties_at(held, given)
+        for name in given.keys() - {s.name for s in held}:
+            driven[COMMANDS[name]] = self._surfaces[name].command_for(given[name])
         share = self._share(command)
         for i in range(max(self._survey.engines, 1)):
             if self.program.has(f"fcs/throttle-cmd-norm[{i}]"):
@@ -187,11 +190,12 @@ def _state(flights: ShortFlights, place: int, throttle: float) -> Flight:
     return Flight(speed, alpha, beta, (p, q, r), phi, theta, float(flights.altitude[place]), throttle)
 
 
-def _to_surface(surface: JsbsimSurface, command: float, offset: float) -> dict[str, float]:
-    """Properties that give a commanded deflection (rad); the model's own servo adds its offset (rad)."""
-    if surface.feedback:
-        return surface.at(command + offset)
-    return {COMMANDS[surface.name]: surface.command_for(command + offset)}
+def _held(surfaces: Sequence[JsbsimSurface]) -> list[JsbsimSurface]:
+    """The controls whose positions are set: those that depend on the motion, and those that move what these move."""
+    names = {name for s in surfaces if s.feedback for name in s.properties}
+    while more := {n for s in surfaces if names & set(s.properties) for n in s.properties} - names:
+        names |= more
+    return [s for s in surfaces if s.feedback or names & set(s.properties)]
 
 
 def _rotation(phi: float, theta: float, psi: float) -> Array:

@@ -31,7 +31,7 @@ from sysid_node.sim.export.rosflight import (
 )
 from sysid_node.sim.export.steady import Coefficients, Columns, SteadyModel
 from sysid_node.sim.importing.plant import LoadFunction, PlantStates, nondimensional
-from sysid_node.sim.importing.rosflight import read_rosflight, rosflight_loads
+from sysid_node.sim.importing.rosflight import NO_SERVO_LAG, read_rosflight, rosflight_loads
 
 Array = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def _values(change: _Change, before: Aircraft) -> dict[str, _Edit]:
     edits |= dict.fromkeys(("CT_0", "CT_1", "CT_2"), ("times", _thrust_ratio(change)))
     lags = servo_lags(before, change.after.effects)
     if lags != servo_lags(before, change.before.effects) and lags:
-        edits["servo_tau"] = ("set", sum(lags.values()) / len(lags))
+        edits["servo_tau"] = ("set", sum(lags.values()) / len(lags) or NO_SERVO_LAG)
     return edits
 
 

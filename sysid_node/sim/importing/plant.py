@@ -178,8 +178,9 @@ def _level_flight(plant: Plant, airspeed: float | None) -> LevelFlight:
         found = _balance(plant, speed)
         if found is not None:
             return found
+    told = " or ".join(f"{speed:.1f}" for speed in sorted(speeds))
     raise InputError(
-        f"model {plant.name!r}: no level flight at {speeds[0]:.1f} m/s that its controls and throttle can hold; "
+        f"model {plant.name!r}: no level flight at {told} m/s that its controls and throttle can hold; "
         "give another --airspeed"
     )
 

@@ -62,8 +62,8 @@ def read_rosflight(path: Path, airspeed: float | None = None) -> Imported:
     plant = Plant(
         name=path.stem,
         source=f"parameters of rosflight_sim in {path.name}",
-        mass=get("mass"),
-        inertia=Inertia(get("Jxx"), get("Jyy"), get("Jzz"), get.or_else("Jxz", 0.0)),
+        mass=get.positive("mass"),
+        inertia=Inertia(get.positive("Jxx"), get.positive("Jyy"), get.positive("Jzz"), get.or_else("Jxz", 0.0)),
         geometry=model.geometry,
         density=model.density,
         controls=controls,
@@ -143,6 +143,13 @@ class _Getter:
             raise InputError(f"{self._path}: {name}: got {value!r:.60}, expected a number")
         return float(value)
 
+    def positive(self, name: str) -> float:
+        """The number, above zero. Raises InputError."""
+        value = self(name)
+        if not value > 0.0:
+            raise InputError(f"{self._path}: {name} is {value:g}; it must be above zero")
+        return value
+
     def or_else(self, name: str, default: float) -> float:
         """The number, or the default where the file has none."""
         known = name in self._parameters or _ALIASES.get(name, "") in self._comments
@@ -153,10 +160,8 @@ class _Model:
     """ROSflight's loads."""
 
     def __init__(self, get: _Getter, *, blend: bool, powered: bool) -> None:
-        self.geometry = Geometry(get("wing_s"), get("wing_b"), get("wing_c"))
-        self.density = get("rho")
-        if not (min(self.geometry.S, self.geometry.b, self.geometry.cbar) > 0.0 and self.density > 0.0):
-            raise InputError("rosflight parameters wing_s, wing_b, wing_c and rho must be positive; check the file")
+        self.geometry = Geometry(get.positive("wing_s"), get.positive("wing_b"), get.positive("wing_c"))
+        self.density = get.positive("rho")
         self._blend, self._M, self._alpha0 = blend, get("wing_M"), get("wing_alpha0")
         regressors = ("O", "alpha", "beta", "p", "q", "r", "delta_a", "delta_e", "delta_r")
         self._c = {

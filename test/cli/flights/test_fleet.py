@@ -136,6 +136,7 @@ def test_of_two_commands_on_one_folder_the_second_says_so(fleet: Path, capsys: p
         (("--workers", "0"), "--workers 0: expected 1 to 1000"),
         (("--time-limit", "0"), "--time-limit 0: expected a number of seconds"),
         (("--retries", "-1"), "--retries -1: expected 0 to 100"),
+        (("--dry-run", "--memory", "2XB"), "--memory '2XB': expected a size, e.g. 2GB"),
     ],
 )
 def test_a_wrong_option_is_one_line(

@@ -53,6 +53,14 @@ def test_the_flight_fitted_cannot_be_held_out(tmp_path: Path, capsys: pytest.Cap
 
 
 @pytest.mark.skipif(not BAG.is_dir(), reason="the bundled flights are not here")
+def test_the_same_flight_twice_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Also by another name of the same folder."""
+    again = BAG.parent / ".." / BAG.parent.name / BAG.name
+    assert main(["gap", str(BAG), str(again), "--aircraft", "cdrw", "--out", str(tmp_path / "out")]) == 2
+    assert f"{again}: this flight is given twice; leave it out once" in said(capsys)
+
+
+@pytest.mark.skipif(not BAG.is_dir(), reason="the bundled flights are not here")
 def test_a_real_flight_given_as_a_simulated_one_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["gap", str(BAG), "--aircraft", "cdrw", "--out", str(tmp_path / "out"), "--quiet", "--simulated", str(BAG)]
     assert main(words) == 2

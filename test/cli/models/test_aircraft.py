@@ -66,6 +66,18 @@ def test_a_wrong_sign_is_named_with_its_range(tmp_path, capsys):
     assert "Cm_alpha = 0.235 1/rad (usual: -4 to 0): positive: unstable in pitch" in " ".join(said.split())
 
 
+def test_a_mass_in_grams_is_said_although_there_is_no_level_flight(tmp_path, capsys):
+    text = CDRW.read_text().replace("mass: 4.0 ", "mass: 4000.0 ")
+    (tmp_path / "grams.yaml").write_text(text)
+    assert sysid(tmp_path / "grams.yaml") == 2
+    said = capsys.readouterr()
+    assert "mass over wing area = " in said.out
+    assert "mass in grams or pounds" in said.out
+    assert f"sysid aircraft: {tmp_path / 'grams.yaml'}: aircraft cdrw: no level flight" in said.err
+    assert sysid(tmp_path / "grams.yaml", "--quiet") == 2
+    assert capsys.readouterr().out == ""
+
+
 def test_an_unknown_name_is_one_line(capsys):
     assert sysid("cdrv") == 2
     assert capsys.readouterr().err.count("\n") == 1

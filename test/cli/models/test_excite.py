@@ -109,12 +109,28 @@ def test_a_control_alone_leaves_the_other_axis_unknown(tmp_path):
     assert "22 of" not in (tmp_path / "report.html").read_text()
 
 
+def test_a_flight_that_leaves_the_envelope_is_said(tmp_path, capsys):
+    """The page's words; the departure in angle of attack is predicted anew here."""
+    large = "doublet:elevator:amplitude=0.2"
+    assert sysid("--aircraft", "cdrw", "--manoeuvre", large, "--out", tmp_path / "a", "--rate", "50") == 0
+    said = capsys.readouterr().out.splitlines()[1]
+    flown = load_flight_record(tmp_path / "a" / "flight", load_aircraft("cdrw"))
+    share = 100.0 * np.abs(flown["alpha"] - flown["alpha"][0]).max() / 0.1
+    assert said.startswith("The flight exceeds the envelope in angle of attack (")
+    assert float(said.partition("(")[2].partition("\u202f")[0]) == pytest.approx(share, rel=0.02)
+    assert sysid("--aircraft", "cdrw", "--manoeuvre", SPEC, "--out", tmp_path / "b", "--rate", "50") == 0
+    assert "envelope" not in capsys.readouterr().out
+
+
 MISTAKES = [
     (["--aircraft", "cdrv"], "aircraft 'cdrv' is not known"),
     (["--manoeuvre", "doublet:flap:amplitude=0.1"], "cdrw has no control 'flap'"),
     (["--manoeuvre", "doublet:elevator:amplitude=0.5"], "lower the amplitude"),
     (["--airspeed", "2"], "no steady flight at 2 m/s"),
     (["--evaluations", "1"], "--evaluations 1: expected 10 to 10000"),
+    (["--evaluations", "50"], "--evaluations 50: nothing is optimised; give --optimise, or leave it out"),
+    (["--manoeuvre", "3211:throttle:amplitude=0.2"], "throttle reaches -0.05616 at 2.50 s, but cdrw allows 0 to 1"),
+    (["--manoeuvre", "3211:elevator:width=0.001"], "steps of 0.001 s cannot be drawn at 100 Hz"),
     (["--envelope", "alfa=1"], "did you mean 'alpha'?"),
     (["--envelope", "alpha=-1"], "expected alpha=VALUE, above zero"),
     (["--rate", "0.1"], "expected 1 to 10000 Hz"),

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from xml.etree.ElementTree import fromstring, parse
 
 import pytest
@@ -18,6 +19,7 @@ from sysid_node.sim.export.rosflight import rosflight_parameters
 from sysid_node.sim.importing.gazebo.read import read_gazebo
 from sysid_node.sim.importing.rosflight import read_rosflight
 
+BAGS = Path(__file__).resolve().parents[3] / "bags"
 SUMMARY = {
     "aircraft": "cdrw",
     "derivatives": {
@@ -30,8 +32,40 @@ SUMMARY = {
 
 @pytest.fixture
 def run(tmp_path):
-    (tmp_path / "summary.json").write_text(json.dumps(SUMMARY))
+    written = {"command": "replay", "files": ["aircraft.yaml", "summary.json"]}
+    (tmp_path / "summary.json").write_text(json.dumps({**SUMMARY, "written": written}))
+    (tmp_path / "aircraft.yaml").write_text(dump_aircraft(load_aircraft("cdrw")))
     return tmp_path
+
+
+def test_the_aircraft_is_the_runs_own_and_not_one_of_its_name(run):
+    """The file that the run keeps has 3 kg; the aircraft cdrw that comes with the package has not."""
+    (run / "aircraft.yaml").write_text(dump_aircraft(replace(load_aircraft("cdrw"), mass=3.0)))
+    assert main(["export", str(run), "--format", "rosflight", "--out", str(run / "model.yaml"), "--quiet"]) == 0
+    assert yaml.safe_load((run / "model.yaml").read_text())["/**"]["ros__parameters"]["mass"] == 3.0
+
+
+@pytest.mark.parametrize("method", ["replay", "identify"])
+def test_a_run_is_exported_with_the_aircraft_that_it_began_with(tmp_path, method):
+    """As found in use: 3 kg stand in the user's file, whose name is that of a bundled aircraft."""
+    known = replace(load_aircraft("cdrw"), mass=3.0)
+    (tmp_path / "mine.yaml").write_text(dump_aircraft(known))
+    words = [method, str(BAGS / "cdrw_multistep"), "--aircraft", str(tmp_path / "mine.yaml"), "--quiet"]
+    words += ["--out", str(tmp_path / "run"), *(["--method", "equation_error"] if method == "identify" else [])]
+    assert main(words) == 0
+    assert load_aircraft(tmp_path / "run" / "aircraft.yaml") == known
+    out = tmp_path / "model.yaml"
+    assert main(["export", str(tmp_path / "run"), "--format", "rosflight", "--out", str(out), "--quiet"]) == 0
+    assert yaml.safe_load(out.read_text())["/**"]["ros__parameters"]["mass"] == 3.0
+
+
+def test_a_run_without_its_aircraft_needs_it_named(run, capsys):
+    """An aircraft file beside the summary that the run did not write is another's."""
+    (run / "summary.json").write_text(json.dumps(SUMMARY))
+    words = ["export", str(run), "--format", "rosflight", "--out", str(run / "model.yaml")]
+    assert main(words) == 2
+    assert "'cdrw' may name several; give the one that was used as --aircraft" in capsys.readouterr().err
+    assert main([*words, "--aircraft", "cdrw"]) == 0
 
 
 def test_valid_estimates_replace_the_files(run, capsys):
@@ -80,6 +114,7 @@ def test_a_corrected_file_is_exported_with_its_effects(tmp_path, capsys, form):
     ("arguments", "said"),
     [
         (["nobody", "--format", "jsbsim"], "nobody"),
+        (["kestrel", "--format", "jsbsim", "--aircraft", "cdrw"], "kestrel is an aircraft itself; give one of the two"),
         (["missing/summary.json", "--format", "jsbsim"], "not found"),
         (
             ["{run}/summary.json", "--format", "gazebo", "--effect", "actuator_backlash:elevator=0.02"],
@@ -107,8 +142,8 @@ def test_bad_input_is_one_line(run, capsys, arguments, said):
 
 
 ODD = [
-    ({"aircraft": "../secret.yaml"}, "aircraft '../secret.yaml' is not known"),
-    ({"aircraft": "{run}/secret.yaml"}, "is not known"),
+    ({"aircraft": "../secret.yaml", "written": {}}, "'../secret.yaml' may name several; give"),
+    ({"aircraft": "{run}/secret.yaml", "written": {"files": 3}}, "give the one that was used as --aircraft"),
     ({"derivatives": [1]}, "not the summary.json of a run"),
     ({"derivatives": {"Cm_alpha": 3.0}}, "not the summary.json of a run"),
     ({"derivatives": {"Cm_alpha": {"value": "-0.3", "valid": True}}}, "value is '-0.3', expected a finite number"),
@@ -122,7 +157,8 @@ ODD = [
 def test_odd_summaries_are_one_line(run, capsys, change, said):
     """The aircraft of a summary is a name: a file that it leads to is not read."""
     (run / "secret.yaml").write_text("secret")
-    changed = json.dumps({**SUMMARY, **change}).replace("{run}", str(run))
+    written = {"files": ["aircraft.yaml"]}
+    changed = json.dumps({**SUMMARY, "written": written, **change}).replace("{run}", str(run))
     (run / "summary.json").write_text(changed)
     assert main(["export", str(run), "--format", "jsbsim", "--out", str(run / "m.xml")]) == 2
     message = capsys.readouterr().err

@@ -69,3 +69,32 @@ def test_neither_the_model_nor_another_file_is_overwritten(model, tmp_path, caps
     assert other.read_text() == "mine"
     assert run(model, other, "--force", "--quiet") == 0
     assert run(model, other, "--quiet") == 0  # its own earlier file
+
+
+@pytest.mark.parametrize(
+    ("was", "is_now", "said"),
+    [
+        ("mass: 2.0", "mass: -2.0", "mass is -2; it must be above zero"),
+        ("wing_s: 0.4", "wing_s: 0.0", "wing_s is 0; it must be above zero"),
+        ("rho: 1.2", "rho: 3.0", "no aircraft file can hold it: reference.air_density: got 3.0, expected"),
+    ],
+)
+def test_a_wrong_number_names_the_model_and_not_the_file_to_be(model, tmp_path, capsys, was, is_now, said):
+    model.write_text(PARAMETERS.replace("Jxx: 1.229", "Jxx: 0.7").replace(was, is_now))
+    assert run(model, tmp_path / "a.yaml", "--airspeed", "16") == 2
+    message = capsys.readouterr().err
+    assert message.startswith(f"sysid import: {model}: {said}")
+    assert message.count("\n") == 1
+
+
+def test_sizes_that_do_not_go_together_are_a_warning_in_a_simulators_file(model, tmp_path, capsys):
+    """S is four times b cbar: JSBSim's minisgs has such sizes, and flies by them."""
+    model.write_text(PARAMETERS.replace("wing_s: 0.4", "wing_s: 1.6"))
+    assert run(model, tmp_path / "a.yaml") == 0
+    assert "S = 1.6 m^2 does not go with b cbar = 0.4 m^2; check the units; they are taken" in capsys.readouterr().err
+
+
+def test_all_airspeeds_that_were_tried_are_named(model, tmp_path, capsys):
+    model.write_text(PARAMETERS.replace("C_m_O: 0.02", "C_m_O: 9.0"))
+    assert run(model, tmp_path / "a.yaml") == 2
+    assert "no level flight at 9.5 or 11.7 or 14.3 or 18.1 or 23.3 m/s that" in capsys.readouterr().err

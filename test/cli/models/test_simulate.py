@@ -124,6 +124,10 @@ def test_the_truth_of_a_failure(tmp_path, effects, surfaces, begin, changes):
         (["--turbulence", "biblical"], "expected one of none, light"),
         (["--airspeed", "2"], "no steady flight at 2 m/s"),
         (["--height", "-5"], "expected more than 0"),
+        (["--height", "50"], "--height 50: there is no turbulence that it changes"),
+        (["--linear-gusts"], "there is no turbulence that it changes; give --turbulence, or leave it out"),
+        (["--manoeuvre", "3211:throttle:amplitude=0.2"], "throttle reaches -0.05616 at 2.50 s, but cdrw allows 0 to 1"),
+        (["--manoeuvre", "3211:elevator:width=0.005"], "steps of 0.005 s cannot be drawn at 100 Hz"),
         (["--seed", "-1"], "expected a whole number, 0 or more"),
         (["--effect", "actuator_lga:time_constant=0.1"], "did you mean 'actuator_lag'?"),
         (["--effect", "mass_error:eror=0.1"], "did you mean 'error'?"),
@@ -170,3 +174,17 @@ def test_bundled_flights_are_listed_and_small():
         size = sum(f.stat().st_size for f in (BAGS / name).iterdir())
         assert size < 3_000_000, name  # commands and positions
         assert read_truth(BAGS / name), name
+
+
+def test_the_throttles_usual_amplitude_can_be_flown_by_excite_and_simulate(tmp_path):
+    """cdrw flies level at 0.144 of full throttle: 0.15 would have to be clipped."""
+    words = ["--aircraft", "cdrw", "--manoeuvre", "pulse:throttle", "--duration", "2.5", "--quiet", "--out"]
+    assert main(["simulate", *words, str(tmp_path / "bag")]) == 0
+    assert main(["excite", *words, str(tmp_path / "run")]) == 0
+
+
+def test_with_and_without_the_autopilot_is_a_contradiction(tmp_path, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["simulate", "--aircraft", "cdrw", "--open-loop", "--autopilot", "--out", str(tmp_path / "bag")])
+    assert stop.value.code == 2
+    assert "--autopilot: not allowed with argument --open-loop" in capsys.readouterr().err

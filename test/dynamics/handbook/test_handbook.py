@@ -7,9 +7,20 @@ import pytest
 from plain import DERIVATIVES, make_aircraft
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Control, Geometry, Inertia, LookupTable, ReferenceCondition, UncertainValue
+from sysid_node.aircraft.model import (
+    DEFAULT_NOISE,
+    Control,
+    Geometry,
+    Inertia,
+    LookupTable,
+    ReferenceCondition,
+    Sensors,
+    Throttle,
+    UncertainValue,
+)
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.dynamics.handbook.handbook import handbook
+from sysid_node.dynamics.handbook.unusual import findings_without_flight
 from sysid_node.dynamics.linear_model import DimensionalScales, linear_model
 from sysid_node.errors import InputError
 
@@ -129,6 +140,32 @@ def test_a_wrong_sign_or_unit_is_said(derivative, factor):
 def test_a_mass_in_grams_has_no_level_flight():
     with pytest.raises(InputError, match="lift cannot carry the weight"):
         handbook(make_aircraft(mass=4000.0))
+
+
+UNITS = {
+    "distance of sensors.imu": {"sensors": Sensors(imu=(5.0, 0.0, -2.0))},  # cm
+    "distance of sensors.air_data": {"sensors": Sensors(air_data=(600.0, 0.0, 0.0))},  # mm
+    "throttle.arm": {"throttle": Throttle("throttle", 30.0, arm=-20.0)},  # cm or mm
+    "noise.alpha": {"noise": {**DEFAULT_NOISE, "alpha": 0.3}},  # deg
+    "noise.gyro": {"noise": {**DEFAULT_NOISE, "gyro": 0.2}},  # deg/s
+    "scale of elevator's joint e": {"controls": {"elevator": Control("elevator", "de", {"e": -57.3})}},
+    "rate limit of elevator": {"effects": {"actuator_rate_limit": {"elevator": UncertainValue(400.0)}}},  # deg/s
+    "cg_shift.x": {"effects": {"cg_shift": {"x": UncertainValue(2.0)}}},  # cm
+}
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_another_unit_of_what_no_flight_shows_is_said(name):
+    """Modes and level flight stay as they are, so that nothing else would show it."""
+    usual = {f.name for f in findings_without_flight(make_aircraft()) if f.unusual}
+    changed = make_aircraft(**UNITS[name])
+    assert {f.name for f in findings_without_flight(changed) if f.unusual} - usual == {name}
+
+
+def test_checks_that_need_no_flight_remain_where_there_is_none():
+    found = findings_without_flight(make_aircraft({**DERIVATIVES, "Cl_p": 0.4}, mass=4000.0))
+    assert {"mass over wing area", "Ixx over m b^2", "Cl_p"} <= {f.name for f in found if f.unusual}
+    assert found[0].unusual and not found[-1].unusual
 
 
 def test_what_is_not_known_is_left_out():

@@ -35,9 +35,10 @@ def test_a_run_reads_as_it_was_written(tmp_path: Path) -> None:
     assert rewrite_report(tmp_path).read_text() == before
 
 
-def test_a_gap_says_which_command_writes_its_report(tmp_path: Path) -> None:
-    (tmp_path / "gap.json").write_text("{}")
-    with pytest.raises(InputError, match="run sysid gap again"):
+@pytest.mark.parametrize("command", ["gap", "aircraft", "fleet"])
+def test_what_its_files_do_not_hold_names_the_command_that_writes_the_report(tmp_path: Path, command: str) -> None:
+    (tmp_path / f"{command}.json").write_text("{}")
+    with pytest.raises(InputError, match=f"sysid {command} alone writes it.*; run .* again"):
         rewrite_report(tmp_path)
 
 

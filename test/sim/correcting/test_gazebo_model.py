@@ -153,3 +153,22 @@ def test_another_model_is_one_line(model, tmp_path, was, is_now, said):
     with pytest.raises(InputError, match=said) as error:
         corrected_sdf(other, aircraft)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("derivative", [0.0, 3.0])
+def test_a_changed_lag_is_read_back_whatever_the_derivative_gain(model, tmp_path, derivative):
+    own = tmp_path / "own.sdf"
+    own.write_text(model[0].read_text().replace("<d_gain>0<", f"<d_gain>{derivative}<"))
+    aircraft = read_gazebo(own, 16.0).aircraft
+    lags = {name: item.value for name, item in aircraft.effects["actuator_lag"].items()}
+    exported = corrected_sdf(own, having(aircraft, actuator_lag={**lags, "elevator": 0.2}))
+    assert float(changed(own, exported)["p_gain"]) == pytest.approx(1.0 / 0.2)  # the joint's damping over the lag
+    assert read_again(exported, tmp_path).effects["actuator_lag"]["elevator"].value == pytest.approx(0.2)
+
+
+def test_a_servo_that_is_to_have_no_lag_keeps_it_and_says_so(model):
+    path, aircraft = model
+    lags = {name: item.value for name, item in aircraft.effects["actuator_lag"].items()}
+    lines = corrected_sdf(path, having(aircraft, actuator_lag={**lags, "elevator": 0.0})).left_out
+    assert lines == ("actuator_lag: joint elevator keeps its lag of 0.05 s; a controller against a damping cannot do "
+                     "without one",)  # fmt: skip

@@ -9,7 +9,7 @@ from plain import steps
 pytest.importorskip("jsbsim", reason="JSBSim is not installed")
 
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.aircraft.model import Sensors
+from sysid_node.aircraft.model import Control, Sensors
 from sysid_node.dynamics.attitude import euler_angles
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.correcting.jsbsim_flight import JsbsimFlyer
@@ -70,3 +70,24 @@ def test_short_flights_begin_in_the_given_state(flown):
     states, _, found, begins, _ = flown
     assert found.velocity[begins] == pytest.approx(states[begins, 3:6], abs=0.02)
     assert found.rates[begins] == pytest.approx(states[begins, 10:13], abs=0.005)
+
+
+def test_a_tail_that_two_controls_move_is_set_to_both():
+    """JSBSim's f16: its elevator is moved by the aileron command, too. Truth: the sum of what each adds to its rest."""
+    survey = survey_model("f16", 150.0)
+    symbols = {"elevator": "de", "aileron": "da", "rudder": "dr"}
+    controls = {s.name: Control(s.name, symbols[s.name], {s.name: s.sign}) for s in survey.surfaces}
+    aircraft = replace(load_aircraft("kestrel"), controls=controls, effects={})
+    flyer = JsbsimFlyer(survey, survey.files, aircraft, RATE)
+    command = {"elevator": -0.1, "aileron": 0.05, "rudder": 0.02}
+    commands = np.tile([*command.values(), 0.0], (3, 1))
+    states = np.zeros((3, 13))
+    states[:, 2], states[:, 3], states[:, 5], states[:, 6] = -1000.0, 150.0, 5.0, 1.0
+    flyer.fly_short(np.array([True, False, False]), states, commands, np.zeros((3, 3)), RATE)
+    elevator, aileron = (s for s in survey.surfaces if s.name != "rudder")
+    tail, place = elevator.position, aileron.command_for(0.0)
+    order = np.argsort(aileron.command)
+    still = np.interp(place, aileron.command[order], aileron.properties[tail][order])
+    alone, added = elevator.at(-0.1)[tail], aileron.at(0.05)[tail] - still
+    assert abs(added) > 1e-3
+    assert float(flyer.program.fdm[tail]) == pytest.approx(alone + added, abs=1e-6)

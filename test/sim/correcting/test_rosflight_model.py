@@ -149,3 +149,14 @@ def test_parameters_of_another_aircraft_are_one_line(model):
     with pytest.raises(InputError, match=r"its geometry.S is 0.4, the aircraft 'own' has 0.5") as error:
         corrected_parameters(path, replace(aircraft, geometry=Geometry(0.5, 1.6, 0.25)))
     assert "\n" not in str(error.value)
+
+
+def test_a_servo_that_is_to_have_no_lag_gets_what_rosflight_follows_at_once(tmp_path):
+    """A servo_tau of half of rosflight_sim's refresh period is within one step; the exporter writes it, too."""
+    path = tmp_path / "own.yaml"
+    path.write_text(TEXT)
+    own = read_rosflight(path, 16.0).aircraft
+    assert own.effects["actuator_lag"]["elevator"].value > 0.01
+    none = {"actuator_lag": dict.fromkeys(("elevator", "aileron"), Value(0.0))}
+    exported = corrected_parameters(path, replace(own, effects=none))
+    assert yaml.safe_load(exported.text)["/fixedwing_forces_and_moments"]["ros__parameters"]["servo_tau"] == 0.0015

@@ -176,13 +176,24 @@ def axis_of(plugin):
     return np.array([math.sin(pitch), 0.0, math.cos(pitch)])
 
 
+def pose_of(model, element):
+    """Six numbers; what a pose is relative to does not turn it in these models."""
+    pose = element.find("pose")
+    numbers = np.array([float(v) for v in (element.findtext("pose") or "0 0 0 0 0 0").split()])
+    base = pose.get("relative_to") if pose is not None else None
+    if not base:
+        return numbers
+    (other,) = [e for kind in ("link", "joint") for e in model.findall(kind) if e.get("name") == base]
+    return numbers + pose_of(model, other)
+
+
 def theirs(path, x, aircraft, throttle):
     """Loads (N, 6) about the centre of gravity, forward-right-down, summed over all plugins."""
     model = ElementTree.parse(path).getroot().find(".//model")
     bodies = {}
     for link in model.findall("link"):
         inertial = link.find("inertial")
-        pose = np.array([float(v) for v in (link.findtext("pose") or "0 0 0 0 0 0").split()])
+        pose = pose_of(model, link)
         inner = (
             np.array([float(v) for v in (inertial.findtext("pose") or "0 0 0 0 0 0").split()])
             if inertial is not None
@@ -285,6 +296,19 @@ def test_a_glider_without_joints_has_no_controls(tmp_path):
             "</model></sdf>",
             "AR of an AdvancedLiftDrag plugin is 0; it must be above zero",
         ),
+        (
+            "<sdf><model name='m'><link name='l'/><plugin name='x::LiftDrag'><area>-0.2</area></plugin></model></sdf>",
+            "area of a LiftDrag plugin is -0.2; it must be above zero",
+        ),
+        (
+            "<sdf><model name='m'><link name='l'/><plugin name='x::AdvancedLiftDrag'><AR>6</AR><eff>1</eff>"
+            "<air_density>0</air_density></plugin></model></sdf>",
+            "air_density of an AdvancedLiftDrag plugin is 0",
+        ),
+        (
+            "<sdf><model name='m'><link name='l'><inertial><mass>-2</mass></inertial></link></model></sdf>",
+            "link 'l' has a mass of -2 kg; it must not be negative",
+        ),
         ("<sdf", "not XML"),
         ("<!DOCTYPE a [<!ENTITY b SYSTEM 'file:///etc/passwd'>]><a>&b;</a>", "declares XML entities"),
         ("<!DOCTYPE a [<!ENTITY b 'x'><!ENTITY c '&b;&b;'>]><a>&c;</a>", "declares XML entities"),
@@ -294,4 +318,107 @@ def test_what_is_no_model_is_one_line(tmp_path, text, said):
     path = tmp_path / "model.sdf"
     path.write_text(text)
     with pytest.raises(InputError, match=said):
+        read_gazebo(path)
+
+
+ROTOR = "<pose>0.3 0 0 0 1.5707963 0</pose>"
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [
+        '<pose degrees="true">0.3 0 0 0 90 0</pose>',
+        '<pose relative_to="__model__">0.3 0 0 0 1.5707963 0</pose>',
+        '<pose relative_to="nose">0 0 0.1 0 0 0</pose>',
+        '<pose relative_to="mount">0 0.2 0 0 0 0</pose>',
+    ],
+)
+def test_poses_are_in_degrees_and_relative_where_they_say_so(tmp_path, pose):
+    """The same place in other words: SDF's specification of //pose/@degrees, @relative_to and //frame/@attached_to."""
+    path = small(tmp_path)
+    known = read_gazebo(path).aircraft
+    frames = (
+        '<frame name="nose"><pose>0.2 0 0 0 1.5707963 0</pose></frame>'
+        '<joint name="mount" type="fixed"><parent>base</parent><child>base</child>'
+        '<pose relative_to="side">0 0.1 0 0 1.5707963 0</pose></joint>'
+        '<frame name="side" attached_to="nose"><pose degrees="1">0 -0.3 0.1 0 -90 0</pose></frame>'
+    )
+    assert path.read_text().count(ROTOR) == 1
+    path.write_text(path.read_text().replace(ROTOR, pose).replace("</model>", frames + "</model>"))
+    found = read_gazebo(path).aircraft
+    assert vars(found.inertia) == pytest.approx(vars(known.inertia), abs=1e-8)
+    assert found.throttle.arm == pytest.approx(known.throttle.arm, abs=1e-8)
+    assert found.throttle.inclination == pytest.approx(known.throttle.inclination, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("base", "said"),
+    [("nose", "link 'rotor' stands relative to 'nose', which the model has not"), ("rotor", "stands in a circle")],
+)
+def test_a_pose_relative_to_nothing_is_one_line(tmp_path, base, said):
+    path = small(tmp_path)
+    path.write_text(path.read_text().replace(ROTOR, f'<pose relative_to="{base}">0 0 0 0 0 0</pose>'))
+    with pytest.raises(InputError, match=said):
+        read_gazebo(path)
+
+
+def behind_a_ramp(gain, derivative, damping):
+    """How late (s) a joint follows a ramp: gz-math's PID::Update(error, dt) against the damping, at 1 ms."""
+    step, angle, last = 0.001, 0.0, 0.0
+    for k in range(1, 2001):
+        command = k * step
+        # damping (angle' - angle) / dt = -P error - D (error - last) / dt, error = angle' - command
+        angle = (damping * angle / step + gain * command + derivative * (command + last) / step) / (
+            damping / step + gain + derivative / step
+        )
+        last = angle - command
+    return command - angle
+
+
+@pytest.mark.parametrize("derivative", [0.0, 0.4, 4.0])
+def test_the_lag_of_a_servo_is_that_behind_a_ramp_whatever_its_derivative_gain(tmp_path, derivative):
+    path = small(tmp_path)
+    gains = f"<p_gain>8</p_gain><d_gain>{derivative}</d_gain>"
+    path.write_text(path.read_text().replace("<p_gain>8</p_gain>", gains))
+    found = read_gazebo(path)
+    late = behind_a_ramp(8.0, derivative, 0.4)
+    assert found.aircraft.effects["actuator_lag"]["elevator"].value == pytest.approx(late, abs=2e-3)
+    said = [note for note in found.notes if "d_gain" in note]
+    assert bool(said) == bool(derivative)
+    if said:
+        assert f"tail {derivative / (0.4 + derivative):.0%}" in said[0]
+
+
+def test_one_controller_may_move_several_joints(tmp_path):
+    path = small(tmp_path)
+    text = path.read_text()
+    known = read_gazebo(path).aircraft.effects["actuator_lag"]
+    start = text.index("<plugin filename='x' name='gz::sim::systems::JointPositionController'><joint_name>tail")
+    text = text[:start] + text[text.index("</plugin>", start) + len("</plugin>") :]
+    fin = "<joint_name>fin</joint_name>"
+    path.write_text(text.replace(fin, fin + "<joint_name>tail</joint_name>"))
+    assert read_gazebo(path).aircraft.effects["actuator_lag"] == known
+
+
+def test_a_joint_of_unequal_travel_keeps_the_larger_and_says_so(tmp_path):
+    path = small(tmp_path)
+    before, tail, after = path.read_text().partition('<joint name="tail"')
+    path.write_text(before + tail + after.replace("<lower>-0.5<", "<lower>-0.1<", 1))
+    found = read_gazebo(path)
+    assert found.aircraft.controls["elevator"].limit == pytest.approx(0.5)
+    assert "The joint tail moves from -0.100 to 0.500 rad; a file has one limit both ways." in found.notes
+
+
+@pytest.mark.parametrize(("gain", "said"), [("", True), ("<i_gain>0</i_gain>", False), ("<i_gain>2</i_gain>", True)])
+def test_integral_gains_are_said_also_where_they_are_gz_sims_default(tmp_path, gain, said):
+    """gz-sim's JointPositionController: i_gain is 0.1 where none is stated."""
+    path = small(tmp_path)
+    path.write_text(path.read_text().replace("<p_gain>8</p_gain>", "<p_gain>8</p_gain>" + gain))
+    assert ("Integral gains of the joints' controllers are not held." in read_gazebo(path).notes) == said
+
+
+def test_a_model_of_fins_alone_is_one_line(tmp_path):
+    path = small(tmp_path)
+    path.write_text(path.read_text().replace("<upward>0 0 1</upward>", "<upward>0 1 0</upward>"))
+    with pytest.raises(InputError, match="no LiftDrag surface has <upward> along z, so it has no wing"):
         read_gazebo(path)

@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 from aircraft_loads import coefficients
 
+from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
+from sysid_node.sim.export.jsbsim import export_jsbsim
 
 pytest.importorskip("jsbsim", reason="JSBSim is not installed")
 
 from sysid_node.sim.importing.jsbsim.files import copy_model, find_model, sections
 from sysid_node.sim.importing.jsbsim.program import Flight, Program
 from sysid_node.sim.importing.jsbsim.read import read_jsbsim, read_model
+from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, properties_at
+from sysid_node.sim.importing.jsbsim.survey import survey_model
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +101,52 @@ def test_servos_are_read_out_of_the_flight_control_system(tmp_path):
     assert "aileron" not in effects["actuator_lag"]
 
 
+ELEVON = """<summer name="fcs/{0}-elevon-pos-rad"><input>fcs/elevator-position-rad</input>
+<input>{1}fcs/aileron-position-rad</input></summer>"""
+READ = "<property>fcs/{}-pos-rad</property>"
+MIXED = (
+    "<product><value>0.5</value><{0}>" + READ.format("right-elevon") + READ.format("left-elevon") + "</{0}></product>"
+)
+
+
+def test_elevons_are_moved_by_two_controls(tmp_path):
+    """kestrel's aerodynamics read from elevons what its elevator and aileron were: its derivatives and servos remain.
+
+    Each elevon is moved by both commands; half their sum is the elevator, half their difference the aileron.
+    """
+    kestrel = load_aircraft("kestrel")
+    lags = dict.fromkeys(kestrel.controls, 0.03) | {"aileron": 0.05}
+    head, air = export_jsbsim(kestrel, {"actuator_lag": lags}).text.split("<aerodynamics", 1)
+    mixer, thrust = ELEVON.format("left", "-") + ELEVON.format("right", ""), '<pure_gain name="fcs/thrust-lbs">'
+    for name, kind in (("elevator", "sum"), ("aileron", "difference")):
+        air = air.replace(f"<property>fcs/{name}-position-rad</property>", MIXED.format(kind))
+    assert thrust in head
+    (tmp_path / "kestrel.xml").write_text(head.replace(thrust, mixer + thrust) + "<aerodynamics" + air)
+    found = read_jsbsim(str(tmp_path / "kestrel.xml"), 16.0).aircraft
+    for name, known in kestrel.derivatives.items():
+        assert found.derivatives[name].value == pytest.approx(known.value, abs=1e-6), name
+    assert {n: lag.value for n, lag in found.effects["actuator_lag"].items()} == pytest.approx(lags)
+
+
+def test_two_commands_move_a_tail_as_in_the_program():
+    """JSBSim's f16 has a tail that elevator and aileron move: both at once as its own flight control system has it."""
+    survey = survey_model("f16", 150.0)
+    program = Program(survey.files, 100.0)
+    shared = set(survey.surfaces[0].properties) & set(survey.surfaces[1].properties)
+    assert shared
+    state = Flight(150.0, 0.03, theta=0.03, throttle=0.5)
+    shares = {"elevator": 0.5, "aileron": 0.5, "rudder": 0.5}
+    program.put(state, {COMMANDS[name]: share for name, share in shares.items()})
+    program.step(300)
+    deflections = {}
+    for s in survey.surfaces:
+        order = np.argsort(s.command)
+        deflections[s.name] = float(np.interp(shares[s.name], s.command[order], s.deflection[order]))
+    ours = properties_at(survey.surfaces, deflections)
+    for name in sorted(shared):
+        assert ours[name] == pytest.approx(float(program.fdm[name]), abs=1e-3), name
+
+
 def test_a_jet_and_its_yaw_damper(recwarn):
     found = read_jsbsim("737")
     assert found.aircraft.derivatives["Cm_de"].value == pytest.approx(-1.056, abs=0.001)
@@ -111,6 +161,8 @@ def test_a_jet_and_its_yaw_damper(recwarn):
         ("none/here.xml", None, "not found"),
         ("ball", None, "must be an aeroplane"),
         ("c172p", 5.0, "no steady level flight at 5 m/s"),
+        ("c310", None, "no steady level flight at 60, 73, 93 or 119 m/s"),
+        (str(__file__), None, "test_jsbsim.py: JSBSim's models are .xml files; give one, or another --format"),
         ("dr1", None, "does not exist"),
     ],
 )
@@ -120,13 +172,26 @@ def test_what_cannot_be_read_is_one_line(model, airspeed, said):
     assert "\n" not in str(error.value)
 
 
-def test_a_model_without_wing_area_is_one_line(tmp_path):
+@pytest.mark.parametrize("airspeed", [None, 52.0])
+@pytest.mark.parametrize(
+    ("was", "is_now", "said"),
+    [
+        (
+            '<wingarea unit="FT2"> 174 <',
+            '<wingarea unit="FT2"> 0 <',
+            r"c172p.xml: wing area is 0 m\^2; it must be",
+        ),
+        ('<wingarea unit="FT2"> 174 <', '<wingarea unit="FT2"> -9 <', r"wing area is -0.836\d* m\^2; it must be above"),
+        ('<emptywt unit="LBS"> 1500 <', '<emptywt unit="LBS"> -9000 <', r"mass is -\d.* kg; it must be above zero"),
+        ('<wingspan unit="FT"> 35.8 <', '<wingspan unit="FT"> 0 <', "span is 0 m; it must be above zero"),
+    ],
+)
+def test_a_model_without_mass_or_size_is_one_line(tmp_path, airspeed, was, is_now, said):
     text = find_model("c172p").main.read_text()
-    area = '<wingarea unit="FT2"> 174 </wingarea>'
-    assert area in text
-    (tmp_path / "c172p.xml").write_text(text.replace(area, area.replace("174", "0")))
-    with pytest.raises(InputError, match=r"wing area 0 m\^2 in air of .*: no airspeed is enough; check the area"):
-        read_jsbsim(str(tmp_path / "c172p.xml"))
+    assert was in text
+    (tmp_path / "c172p.xml").write_text(text.replace(was, is_now))
+    with pytest.raises(InputError, match=said):
+        read_jsbsim(str(tmp_path / "c172p.xml"), airspeed)
 
 
 def test_a_property_that_is_not_there_is_one_line_and_no_abort(tmp_path):

@@ -25,6 +25,8 @@ STAGE, EARLIER = ".sysid-unfinished", ".sysid-earlier"
 _ATTEMPTS = 20
 #: The files of which one lists all files of a run, and the key under which it does.
 CONTENTS, WRITTEN = ("summary.json", "gap.json", "aircraft.json", "fleet.json"), "written"
+#: The aircraft file that a run began with, whole.
+AIRCRAFT = "aircraft.yaml"
 #: Names of results that earlier versions wrote without a list; ``--force`` removes them.
 _UNLISTED = frozenset(
     ["summary.json", "gap.json"]

@@ -11,10 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from sysid_node.aircraft.dump import dump_aircraft
+from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.interruption import on_interrupt
 from sysid_node.online.types import DerivativeEstimate, Estimates
 from sysid_node.report.drawing.thinning import MAX_ROWS, thin_curve, thin_flight
+from sysid_node.report.files.outputs.output_folder import AIRCRAFT
 from sysid_node.report.files.runs import run_tables as tables
 from sysid_node.report.files.runs.fault_summary import as_summary, from_summary
 from sysid_node.report.pages.run_page import write_report
@@ -38,6 +41,12 @@ def write_run(folder: Path, run: RunResult) -> None:
         text = json.dumps(summary(stored), indent=2, ensure_ascii=False, allow_nan=False)
         (folder / SUMMARY).write_text(text + "\n", encoding="utf-8")
         write_report(folder / REPORT, stored)
+
+
+def write_aircraft(folder: Path, aircraft: Aircraft) -> None:
+    """Writes the aircraft that a run began with beside its other files. Raises InputError where that fails."""
+    with _writing(folder):
+        (folder / AIRCRAFT).write_text(dump_aircraft(aircraft), encoding="utf-8")
 
 
 def rebuild_report(folder: Path) -> Path:

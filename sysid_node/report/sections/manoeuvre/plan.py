@@ -35,7 +35,7 @@ def opening(result: ManoeuvreResult) -> Mapping[str, Any]:
         "well": int((left < WELL).sum()),
         "count": plural(left.size, "derivative"),
         "hardly": int((left > HARDLY).sum()),
-        "beyond": _beyond(result),
+        "beyond": beyond_envelope(result),
         "optimum": None if optimum is None else _optimum(optimum),
         "facts": [
             ("Aircraft", result.aircraft.name),
@@ -83,7 +83,7 @@ def _figure(result: ManoeuvreResult, surfaces: list[str]) -> Figure:
     )
 
 
-def _beyond(result: ManoeuvreResult) -> list[str]:
+def beyond_envelope(result: ManoeuvreResult) -> list[str]:
     """Limits of the envelope that the flight exceeds, in words."""
     names = {
         "alpha": "angle of attack",

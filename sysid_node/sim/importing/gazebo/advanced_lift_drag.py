@@ -13,8 +13,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.errors import InputError
-from sysid_node.sim.importing.gazebo.sdf import number_in, vector_in
+from sysid_node.sim.importing.gazebo.numbers import number_in, positive_in, vector_in
 
 Array = NDArray[np.float64]
 
@@ -37,16 +36,11 @@ class AdvancedLiftDrag:
     def of(cls, plugin: Element, file: str) -> AdvancedLiftDrag:
         """The parameters of an SDF element. Raises InputError."""
         names = [f"{c}{x}" for c in _NAMES for x in ("a", "b", "p", "q", "r")]
-        values = {
-            name: number_in(plugin, name, 0.0, file) for name in (*names, "CL0", "CD0", "Cem0", "AR", "eff", "mac")
-        }
-        defaults = {"area": 1.0, "air_density": 1.2041, "alpha_stall": np.pi / 2.0, "Cema_stall": 0.0}
+        values = {name: number_in(plugin, name, 0.0, file) for name in (*names, "CL0", "CD0", "Cem0", "mac")}
+        defaults = {"alpha_stall": np.pi / 2.0, "Cema_stall": 0.0}
         values |= {name: number_in(plugin, name, value, file) for name, value in defaults.items()}
-        for name in ("AR", "eff", "area"):
-            if not values[name] > 0.0:
-                raise InputError(
-                    f"{file}: {name} of an AdvancedLiftDrag plugin is {values[name]:g}; it must be above zero"
-                )
+        sizes = {"AR": 0.0, "eff": 0.0, "area": 1.0, "air_density": 1.2041}
+        values |= {name: positive_in(plugin, name, value, file) for name, value in sizes.items()}
         joints: dict[str, Array] = {}
         for surface in plugin.findall("control_surface"):
             name = (surface.findtext("name") or "").strip()

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.sim.importing.gazebo.sdf import number_in, vector_in
+from sysid_node.sim.importing.gazebo.numbers import number_in, positive_in, vector_in
 
 Array = NDArray[np.float64]
 
@@ -39,8 +39,8 @@ class LiftDrag:
             place=vector_in(plugin, "cp", (0.0, 0.0, 0.0), file),
             forward=_unit(vector_in(plugin, "forward", (1.0, 0.0, 0.0), file)),
             upward=_unit(vector_in(plugin, "upward", (0.0, 0.0, 1.0), file)),
-            area=number_in(plugin, "area", 1.0, file),
-            density=number_in(plugin, "air_density", 1.2041, file),
+            area=positive_in(plugin, "area", 1.0, file),
+            density=positive_in(plugin, "air_density", 1.2041, file),
             alpha0=number_in(plugin, "a0", 0.0, file),
             slopes={name: number_in(plugin, name, value, file) for name, value in defaults.items()},
             alpha_stall=number_in(plugin, "alpha_stall", np.pi / 2.0, file),

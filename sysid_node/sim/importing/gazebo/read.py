@@ -15,8 +15,9 @@ from sysid_node.errors import InputError
 from sysid_node.sim.importing.gazebo.advanced_lift_drag import AdvancedLiftDrag
 from sysid_node.sim.importing.gazebo.controls import controls_of, joint_angles
 from sysid_node.sim.importing.gazebo.lift_drag import LiftDrag
-from sysid_node.sim.importing.gazebo.motion import motor_effects, servo_effects
-from sysid_node.sim.importing.gazebo.sdf import SdfModel, masses, number_in, read_sdf
+from sysid_node.sim.importing.gazebo.motion import I_GAIN, leads, motor_effects, servo_effects
+from sysid_node.sim.importing.gazebo.numbers import number_in
+from sysid_node.sim.importing.gazebo.sdf import SdfModel, masses, read_sdf
 from sysid_node.sim.importing.imported import Imported
 from sysid_node.sim.importing.plant import Plant, PlantEngine, PlantStates, aircraft_of, nondimensional
 
@@ -70,7 +71,7 @@ def _plant(model: SdfModel, file: str) -> tuple[Plant, _Loads, tuple[bool, bool]
     if missing:
         raise InputError(f"{model.file}: a lift-drag plugin names the link {min(missing)!r}, which the model has not")
     mass, centre, inertia = masses(model)
-    geometry, density = _geometry(simple, advanced)
+    geometry, density = _geometry(simple, advanced, model.file)
     loads = _Loads(model, centre, simple, advanced, _rotor(model, centre))
     controls = controls_of(_power(loads, geometry, density), _limits(model, loads.joints))
     loads.controls = controls
@@ -161,16 +162,20 @@ def _about(force: Array, arm: Array) -> Array:
     return np.hstack([force, np.cross(np.broadcast_to(arm, force.shape), force)])
 
 
-def _geometry(simple: Sequence[LiftDrag], advanced: Sequence[AdvancedLiftDrag]) -> tuple[Geometry, float]:
+def _geometry(simple: Sequence[LiftDrag], advanced: Sequence[AdvancedLiftDrag], file: str) -> tuple[Geometry, float]:
     """Reference sizes and density: the plugin's own, or of separate surfaces the sum of the horizontal ones' areas.
 
     A LiftDrag plugin states neither span nor chord; the span is twice the largest distance of a surface's place from
     the middle and of its own half width, the chord the area over the span.
+
+    Raises InputError where no surface is horizontal.
     """
     if advanced:
         whole = advanced[0]
         return Geometry(whole.values["area"], whole.span, whole.chord), whole.values["air_density"]
     wings = [wing for wing in simple if abs(wing.upward[2]) > 0.7]
+    if not wings:
+        raise InputError(f"{file}: no LiftDrag surface has <upward> along z, so it has no wing; correct <upward>")
     area = sum(wing.area for wing in wings)
     places = sorted({round(abs(float(wing.place[1])), 6) for wing in wings})
     reach = places[-1] + (0.5 * (places[-1] - places[-2]) if len(places) > 1 else 0.0)
@@ -200,13 +205,13 @@ def _power(loads: _Loads, geometry: Geometry, density: float) -> dict[str, Array
 
 
 def _limits(model: SdfModel, joints: Sequence[str]) -> dict[str, float]:
-    """The largest angle of each joint both ways, rad, of those that have limits."""
+    """The largest angle of each joint either way, rad, of those that have limits."""
     limits = {}
     for joint in joints:
         ends = [model.joint_number(joint, f"axis/limit/{end}") for end in ("lower", "upper")]
         known = [abs(end) for end in ends if end is not None]
         if known:
-            limits[joint] = min(known)
+            limits[joint] = max(known)
     return limits
 
 
@@ -260,9 +265,24 @@ def _notes(model: SdfModel, loads: _Loads, throttle: float, simple: bool, advanc
         notes.append(f"Of {len(motors)} motors only the first is held; a file has one throttle.")
     if any(model.includes):
         notes.append(f"Masses of included models ({', '.join(filter(None, model.includes))}) are not counted.")
-    if any(
-        (p.findtext("i_gain") or "0").strip() not in ("", "0", "0.0")
-        for p in model.plugins_named("JointPositionController")
-    ):
+    return notes + _servo_notes(model, loads.joints)
+
+
+def _servo_notes(model: SdfModel, joints: Sequence[str]) -> list[str]:
+    """What of the joints' travel and of their controllers the file does not hold."""
+    notes = []
+    for joint in joints:
+        low, high = (model.joint_number(joint, f"axis/limit/{end}") for end in ("lower", "upper"))
+        if low is not None and high is not None and abs(low + high) > 0.05 * (high - low):
+            notes.append(f"The joint {joint} moves from {low:.3f} to {high:.3f} rad; a file has one limit both ways.")
+    controllers = model.plugins_named("JointPositionController")
+    if any(number_in(p, "i_gain", I_GAIN, model.file) for p in controllers):
         notes.append("Integral gains of the joints' controllers are not held.")
+    jumps = leads(model, joints)
+    if jumps:
+        told = ", ".join(f"{joint} {share:.0%}" for joint, share in jumps.items())
+        notes.append(
+            f"A derivative gain (d_gain) lets a joint take a part of a step at once ({told}); a file has no such lead, "
+            "and its lag is that behind a ramp."
+        )
     return notes

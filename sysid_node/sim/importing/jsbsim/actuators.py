@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from xml.etree.ElementTree import Element
@@ -38,8 +38,26 @@ class JsbsimServo:
         return {name: size for name, size in sizes.items() if size}
 
 
-def chain_to(position: str, sections: Sequence[Element], command: str) -> list[Element]:
-    """The components between a command and a position, the last first; other inputs are followed as well."""
+def chain_to(position: str, sections: Sequence[Element], command: str, others: Collection[str] = ()) -> list[Element]:
+    """The components between a command and a position, the last first; other inputs are followed as well.
+
+    ``others`` are commands that move the position, too: what follows one of them and not ``command`` is left out.
+    """
+    found = _followed(position, sections, command)
+    if not others:
+        return found
+    return [component for component in found if not _of_others(component, sections, command, others)]
+
+
+def _of_others(component: Element, sections: Sequence[Element], command: str, others: Collection[str]) -> bool:
+    """Whether a component follows another command, and not this one."""
+    before = [component, *(c for name in inputs_of(component) for c in _followed(name, sections, command))]
+    read = {name for c in before for name in inputs_of(c)}
+    return command not in read and bool(read & set(others))
+
+
+def _followed(position: str, sections: Sequence[Element], command: str) -> list[Element]:
+    """The components that a position follows from, the last first."""
     writers: dict[str, Element] = {}
     for section in sections:
         for holder in [section, *section.findall("channel")]:

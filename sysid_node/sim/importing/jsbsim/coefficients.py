@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.names import CONTROL_SYMBOLS
 from sysid_node.sim.importing.expansion import TableAxis
 from sysid_node.sim.importing.jsbsim.program import LEVER, Loads, Program
-from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
+from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface, properties_at
 from sysid_node.sim.importing.jsbsim.throttle import engine_of
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight
 
@@ -75,9 +75,7 @@ class CoefficientModel:
         full = {**self.centre, **at}
         half = 2.0 * full["V"]
         rates = (full["p"] * half / self._span, full["q"] * half / self._chord, full["r"] * half / self._span)
-        driven: dict[str, float] = {}
-        for symbol, surface in self._surfaces.items():
-            driven |= surface.at(full[symbol])
+        deflections = {surface.name: full[symbol] for symbol, surface in self._surfaces.items()}
         # theta is the steady flight's: gravity's direction does not matter for the loads, once dalpha/dt is known
         state = replace(
             self._steady.state,
@@ -88,7 +86,7 @@ class CoefficientModel:
             phi=phi,
             throttle=full.get("throttle", self._steady.state.throttle),
         )
-        self._program.put(state, driven)
+        self._program.put(state, properties_at(self._surfaces.values(), deflections))
 
     def _reduced(self, loads: Loads, at: Mapping[str, float]) -> Array:
         lever = at.get("throttle", self._steady.state.throttle) / (self._steady.state.throttle or 1.0)

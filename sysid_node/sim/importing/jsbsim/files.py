@@ -43,6 +43,8 @@ def find_model(model: str) -> ModelFiles:
     if path.suffix.lower() == ".xml" or path.is_file():
         if not path.is_file():
             raise InputError(f"{model}: not found; give a model's XML file, or the name of an aircraft of JSBSim")
+        if path.suffix.lower() != ".xml":
+            raise InputError(f"{model}: JSBSim's models are .xml files; give one, or another --format")
         return _beside(path.resolve(), root)
     folder = root / "aircraft" / model
     if model not in _names(root):

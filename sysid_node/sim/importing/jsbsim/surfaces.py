@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element
 
@@ -59,9 +59,32 @@ class JsbsimSurface:
         return float(np.interp(deflection, self.deflection, self.command))
 
     @property
+    def at_rest(self) -> dict[str, float]:
+        """The properties where nothing is commanded."""
+        order = np.argsort(self.command, kind="stable")
+        return {n: float(np.interp(0.0, self.command[order], x[order])) for n, x in self.properties.items()}
+
+    @property
     def limit(self) -> float:
         """The largest deflection, rad."""
         return float(np.abs(self.deflection).max())
+
+
+def properties_at(surfaces: Iterable[JsbsimSurface], deflections: Mapping[str, float]) -> dict[str, float]:
+    """The properties of several surfaces at deflections (rad) by name.
+
+    What two of them move, such as an elevon, is its value at rest and what each of them adds to that.
+    """
+    found: dict[str, float] = {}
+    for surface in surfaces:
+        rest: dict[str, float] | None = None
+        for name, value in surface.at(deflections[surface.name]).items():
+            if name in found:
+                rest = surface.at_rest if rest is None else rest
+                found[name] += value - rest[name]
+            else:
+                found[name] = value
+    return found
 
 
 def find_surfaces(program: Program, aerodynamics: Sequence[Element], state: Flight, rate: float) -> list[JsbsimSurface]:

@@ -13,7 +13,7 @@ from sysid_node.errors import InputError
 from sysid_node.sim.importing.jsbsim.actuators import JsbsimServo, chain_to, read_servo, throttle_times
 from sysid_node.sim.importing.jsbsim.files import ModelFiles, copy_model, find_model, outputs_of, sections
 from sysid_node.sim.importing.jsbsim.program import LEVER, Flight, Program, never_destroy_programs
-from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, JsbsimSurface, find_surfaces, gains_to
+from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, JsbsimSurface, find_surfaces, gains_to, properties_at
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight, default_airspeeds, find_trim, no_trim
 
 #: Altitude (m) where none is given: above ground effect.
@@ -81,13 +81,14 @@ def _survey(
     systems = [part for part in parts if part.tag != "aerodynamics"]
     start = Flight(50.0, 0.03, theta=0.03, altitude=altitude, throttle=0.5)
     stock = Program(copy_model(files, place / "stock", ()), _WATCH_RATE)
+    _check_sizes(files, stock)
     speeds = [airspeed] if airspeed is not None else default_airspeeds(stock, start)
     surfaces = find_surfaces(stock, aerodynamics, replace(start, airspeed=speeds[0]), _WATCH_RATE)
     if not surfaces:
         raise InputError(
             f"model {files.label}: no command moves a surface that the aerodynamics read; it must be an aeroplane"
         )
-    found = {s.name: _servo(stock, s, systems, replace(start, airspeed=speeds[0])) for s in surfaces}
+    found = {s.name: _servo(stock, s, surfaces, systems, replace(start, airspeed=speeds[0])) for s in surfaces}
     servos, chains = {n: servo for n, (servo, _) in found.items()}, {n: chain for n, (_, chain) in found.items()}
     moved = {name for surface in surfaces for name in surface.properties}
     program = Program(copy_model(files, place / "driven", moved, (LEVER,)))
@@ -111,6 +112,15 @@ def _survey(
     return survey, program, aerodynamics
 
 
+def _check_sizes(files: ModelFiles, program: Program) -> None:
+    """Raise InputError where the mass or a size is none."""
+    area, span, chord = program.geometry
+    sizes = {"mass": (program.mass, "kg"), "wing area": (area, "m^2"), "span": (span, "m"), "chord": (chord, "m")}
+    for name, (value, unit) in sizes.items():
+        if not value > 0.0:
+            raise InputError(f"model {files.label}: {name} is {value:g} {unit}; it must be above zero; correct it")
+
+
 def _steady(
     files: ModelFiles, program: Program, surfaces: Sequence[JsbsimSurface], states: list[Flight]
 ) -> SteadyFlight:
@@ -118,7 +128,7 @@ def _steady(
         found = find_trim(program, surfaces, state)
         if found is not None:
             return found
-    raise no_trim(files.name, states[0].airspeed)
+    raise no_trim(files.name, [state.airspeed for state in states])
 
 
 def _usual_signs(program: Program, surfaces: Sequence[JsbsimSurface], steady: SteadyFlight) -> list[JsbsimSurface]:
@@ -126,20 +136,24 @@ def _usual_signs(program: Program, surfaces: Sequence[JsbsimSurface], steady: St
     place = {"elevator": 4, "aileron": 3, "rudder": 5}
 
     def moment(name: str, change: float) -> float:
-        driven: dict[str, float] = {}
-        for surface in surfaces:
-            driven |= surface.at(steady.deflections[surface.name] + (change if surface.name == name else 0.0))
-        program.put(steady.state, driven)
+        moved = {**steady.deflections, name: steady.deflections[name] + change}
+        program.put(steady.state, properties_at(surfaces, moved))
         return float(program.loads().air[place[name]])
 
     return [s.flipped() if moment(s.name, 0.02) > moment(s.name, -0.02) else s for s in surfaces]
 
 
 def _servo(
-    program: Program, surface: JsbsimSurface, systems: Sequence[Element], state: Flight
+    program: Program,
+    surface: JsbsimSurface,
+    surfaces: Sequence[JsbsimSurface],
+    systems: Sequence[Element],
+    state: Flight,
 ) -> tuple[JsbsimServo, ServoChain]:
     """The servo of a control; ``program`` runs the model with its own flight control system."""
-    chain = chain_to(surface.position, systems, COMMANDS[surface.name])
+    own = COMMANDS[surface.name]
+    others = {COMMANDS[s.name] for s in surfaces if s is not surface and surface.position in s.properties}
+    chain = chain_to(surface.position, systems, own, others)
     names = [name for component in chain for name in outputs_of(component)]
     gains = gains_to(program, surface, names, state, _WATCH_RATE)
     return read_servo(chain, gains, _FRAMES), ServoChain(tuple(names), gains)

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.errors import InputError
 from sysid_node.sim.importing.jsbsim.program import Flight, Program
-from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
+from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface, properties_at
 
 Array = NDArray[np.float64]
 
@@ -54,9 +54,15 @@ def default_airspeeds(program: Program, state: Flight) -> list[float]:
     area, _, _ = program.geometry
     program.put(replace(state, airspeed=50.0), {})
     density = program.loads().density
-    if not density * area > 0.0:
-        raise InputError(f"wing area {area:g} m^2 in air of {density:g} kg/m^3: no airspeed is enough; check the area")
+    if not density > 0.0:
+        raise InputError(f"air of {density:g} kg/m^3: no airspeed is enough; give another --altitude")
     return [float(np.sqrt(2.0 * program.mass * GRAVITY / (density * area * lift))) for lift in (0.4, 0.25, 0.6, 0.15)]
+
+
+def one_of(airspeeds: Sequence[float]) -> str:
+    """Airspeeds that were tried, in words, without their unit."""
+    *first, last = (f"{speed:.0f}" for speed in sorted(airspeeds))
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 def _state(state: Flight, at: dict[str, float]) -> Flight:
@@ -79,10 +85,7 @@ def _solve(  # type: ignore[no-untyped-def]
 
     def residual(z: Array) -> Array:
         at = dict(zip(names, (float(x) for x in z), strict=True))
-        driven: dict[str, float] = {}
-        for surface in surfaces:
-            driven |= surface.at(at[surface.name])
-        program.put(_state(state, at), driven)
+        program.put(_state(state, at), properties_at(surfaces, at))
         moving = program.accelerations()
         moving[3:] *= 10.0
         return np.array([*moving, *(program.climb for _ in level)])
@@ -103,9 +106,9 @@ def _solve(  # type: ignore[no-untyped-def]
     return least_squares(residual, inside, slopes, bounds=(lower, upper), x_scale=scale, max_nfev=40)
 
 
-def no_trim(name: str, airspeed: float) -> InputError:
-    """The error of a model without steady flight at an airspeed."""
+def no_trim(name: str, airspeeds: Sequence[float]) -> InputError:
+    """The error of a model without steady flight at any of these airspeeds."""
     return InputError(
-        f"JSBSim's {name!r} has no steady level flight at {airspeed:.0f} m/s that its elevator, aileron, rudder and "
-        "throttle can hold; give another --airspeed or --altitude"
+        f"JSBSim's {name!r} has no steady level flight at {one_of(airspeeds)} m/s that its elevator, aileron, rudder "
+        "and throttle can hold; give another --airspeed or --altitude"
     )
