@@ -86,13 +86,15 @@ def px4_log(
     vanes: Mapping[str, tuple[float, float]] | None = None,
     aloft: tuple[float, float] | None = None,
     pulses: str = "",
+    blocked: tuple[float, float] | None = None,
 ) -> FlightRecord:
     """A ULog of the flight, of PX4 1.11 where ``old``; without ``drop``, its clock ``jump`` s ahead from midway.
 
     ``torque``: rate of the torque setpoint, Hz, from which PX4 computes the servos linearly. ``start`` is the date that
     its GPS receiver states, and ``vehicle`` the autopilot's number. ``vanes`` are "aoa" and "slip" with the time (s)
     between which each is out of its range, and ``aloft`` those between which the aircraft flies.
-    ``pulses``: the bank, MAIN or AUX, whose pulses are logged in place of the servos' commands.
+    ``pulses``: the bank, MAIN or AUX, whose pulses are logged in place of the servos' commands. ``blocked``: the times
+    (s) between which the airspeed sensor, logged at 50 Hz too, is blocked and not used by PX4.
     """
     record = flight()
     us = microseconds(record)
@@ -105,6 +107,9 @@ def px4_log(
         *(_vane(record, at["airspeed"], name, span) for name, span in (vanes or {}).items()),
     ]
     parameters = {} if old else _px4_parameters(elevons=elevons)
+    if blocked is not None:
+        topics = [topic for topic in topics if topic.name != "airspeed_validated"]
+        topics += _blocked_sensor(record, at["airspeed"], blocked)
     if pulses:
         topics, stated = _as_pulses(topics, pulses)
         parameters |= stated
@@ -190,6 +195,23 @@ def _vane(record: FlightRecord, at: np.ndarray, name: str, span: tuple[float, fl
     angle = np.where(valid, record[{"aoa": "alpha", "slip": "beta"}[name]][at], 1.0)
     fields = {f"{name}_rad": ("float", angle), "valid": ("bool", valid)}
     return Topic(f"airflow_{name}", microseconds(record)[at], fields)
+
+
+def _blocked_sensor(record: FlightRecord, at: np.ndarray, span: tuple[float, float]) -> list[Topic]:
+    """The validated airspeed, and the sensor's, 10 % lower and 7 m/s in the time between the two of the span (s)."""
+
+    def out(places: np.ndarray) -> np.ndarray:
+        since = record.time[places] - record.time[0]
+        return (since >= span[0]) & (since < span[1])
+
+    fine = picked(record, 50.0)
+    raw = np.where(out(fine), 7.0, record["V"][fine] / 1.1)
+    return [
+        Topic("airspeed_validated", microseconds(record)[at], {
+            "true_airspeed_m_s": ("float", record["V"][at]), "airspeed_source": ("int8_t", np.where(out(at), 0, 1)),
+        }),
+        Topic("airspeed", microseconds(record)[fine], {"true_airspeed_m_s": ("float", raw)}),
+    ]  # fmt: skip
 
 
 def _px4_controls(us: np.ndarray, commands: np.ndarray, *, old: bool, elevons: bool) -> list[Topic]:

@@ -121,9 +121,25 @@ def test_slow_airspeed_moves_as_the_imu_says(tmp_path):
     assert any("airspeed_validated comes at 2 Hz" in remark for remark in remarks)
 
 
+def test_a_sensor_that_px4_does_not_use_is_not_used(tmp_path):
+    """Truth: the record's airspeed. The sensor is blocked from 8 to 12 s (airspeed_source 0, AirspeedValidated.msg)."""
+    record = px4_log(tmp_path / "flight.ulg", {**FULL_RATES, "airspeed": 5.0}, blocked=(8.0, 12.0))
+    air = open_streams(tmp_path / "flight.ulg", aircraft()).air_data
+    since = (air.arrival.stamp_ns - air.arrival.stamp_ns[0]) / 1e9
+    assert not np.any((since > 8.2) & (since < 11.99))
+    at = np.searchsorted(record.time - record.time[0], since + 1e-4) - 1
+    used = (since < 7.99) | (since > 12.2)
+    np.testing.assert_allclose(air.values[used, 0], record["V"][at][used], rtol=0.02)
+    assert used.sum() > 750
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        (
+            {"rates": {**FULL_RATES, "airspeed": 5.0}, "blocked": (0.0, 99.0)},
+            "airspeed_validated never comes from a sensor; connect an airspeed sensor",
+        ),
         ({"vehicle_type": 1}, "never flew as a fixed wing"),
         ({"drop": ("airspeed_validated",)}, "no airspeed in it; connect an airspeed sensor"),
         ({"drop": ("sensor_combined",)}, "no sensor_combined in it; SDLOG_PROFILE = 27"),

@@ -128,18 +128,23 @@ def _imu(log: _Topics) -> Signal:
 def _airspeed(log: _Topics) -> tuple[Signal, tuple[str, ...]]:
     """The validated airspeed where a sensor measured it, or the sensor's own where that was logged faster.
 
-    The sensor's is multiplied by the scale that the validated one contains.
+    The sensor's is multiplied by the scale that the validated one contains, and taken where the validated one is of
+    this sensor: PX4 turns to another source where it finds that a sensor is blocked.
     """
     fields = log.fields("airspeed_validated")
     valid = log.signal("airspeed_validated", ("true_airspeed_m_s",))
     source = fields.get("airspeed_source", fields.get("selected_airspeed_index"))
-    if source is not None:
+    if source is None or not len(valid):
+        raw = log.signal("airspeed", ("true_airspeed_m_s",))
+    else:
         measured = (source >= 1) & (source <= 3)
         valid.values[~measured] = np.nan
-        instance = int(np.median(source[measured])) - 1 if np.any(measured) else 0
-        raw = log.signal(f"airspeed/{instance}" if instance else "airspeed", ("true_airspeed_m_s",))
-    else:
-        raw = log.signal("airspeed", ("true_airspeed_m_s",))
+        if not np.any(measured):
+            return valid, ()
+        sensor = int(np.bincount(source[measured]).argmax())
+        raw = log.signal(f"airspeed/{sensor - 1}" if sensor > 1 else "airspeed", ("true_airspeed_m_s",))
+        place = np.searchsorted(valid.stamp_ns, raw.stamp_ns, side="right") - 1
+        raw.values[source[np.maximum(place, 0)] != sensor] = np.nan
     if not len(raw) or len(raw) <= 1.5 * len(valid):
         return valid if len(valid) else raw, ()
     scale = _scale_between(raw, valid)
