@@ -88,6 +88,8 @@ def _refusal(path: Path, read: Callable[[], object]) -> str:
             return text
         except ModuleNotFoundError as error:  # as the command itself, which needs more packages than this one
             return f"needs the package {error.name}, which is not installed; run: pip install -r requirements/desk.txt"
+        except Exception as error:  # as the command itself, whose fault must not hide the rest of the table
+            return f"fails with {type(error).__name__}: {' '.join(str(error).split())}"
     return ""
 
 

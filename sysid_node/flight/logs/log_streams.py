@@ -61,7 +61,9 @@ def _flown_part(log: AutopilotLog, signal: Signal) -> Signal:
 
 
 def part_remarks(log: AutopilotLog) -> tuple[str, ...]:
-    """Which part of the log is taken, a sentence."""
+    """Which part of the log is taken, a sentence; nothing where the log has no IMU."""
+    if not len(log.imu):
+        return ()
     if log.flown is not None and not log.flown:
         return ("never flew as a fixed wing (on the ground, or hovering)",)
     if log.flown is None:

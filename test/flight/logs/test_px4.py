@@ -168,10 +168,13 @@ def test_truncated_and_damaged_logs(tmp_path):
     """A log that was cut short is used as far as it goes; one without content is one line."""
     record = px4_log(tmp_path / "flight.ulg")
     whole = (tmp_path / "flight.ulg").read_bytes()
-    (tmp_path / "short.ulg").write_bytes(whole[: len(whole) // 2])
+    (tmp_path / "short.ulg").write_bytes(whole[: len(whole) // 2 // 2 * 2 + 1])
     assert load_flight_record(tmp_path / "short.ulg", aircraft()).duration == pytest.approx(
         record.duration / 2, rel=0.1
     )
+    for name in ("short", "flight"):
+        said = [remark for remark in open_log(tmp_path / f"{name}.ulg").remarks if "cut short" in remark]
+        assert len(said) == (name == "short")
     (tmp_path / "head.ulg").write_bytes(whole[:400])
     with pytest.raises(InputError, match=r"head\.ulg"):
         load_flight_record(tmp_path / "head.ulg", aircraft())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ _PROFILE = (
     "SDLOG_PROFILE = 27 logs it in full (bits 0 default, 1 estimator replay, 3 system identification, 4 high rate)"
 )
 
+_CUT_SHORT = "the file ends within a message: the log was cut short, by a loss of power or when it was copied"
+
 _REMEDIES = {IMU: _PROFILE, AIRSPEED: _PROFILE, CONTROLS: _PROFILE}
 
 _ARMED, _FIXED_WING = 2, 2  # vehicle_status: arming_state, vehicle_type
@@ -34,10 +37,20 @@ def read_ulog(path: str | Path) -> AutopilotLog:
     try:
         with quietly():  # pyulog prints what it makes of a damaged file
             log = _Topics(core.ULog(str(path)))
+        cut = not (log.ulog.file_corruption or log.ulog.has_data_appended) and _ends_within_a_message(path)
     except Exception as error:  # the parser of a damaged file raises all kinds of exceptions
         words = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path.name}: cannot be read as a PX4 log: {words}; copy it again from the card") from error
-    return _converted(log, path.name)
+    return _converted(log, path.name, (_CUT_SHORT,) if cut else ())
+
+
+def _ends_within_a_message(path: Path) -> bool:
+    """Whether the last message is not whole: a header of 16 bytes, then messages that begin with their sizes."""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        at = 16
+        while at + 2 < len(content):
+            at += 3 + content[at] + 256 * content[at + 1]
+        return at != len(content)
 
 
 class _Topics:
@@ -73,7 +86,7 @@ class _Topics:
         )
 
 
-def _converted(log: _Topics, name: str) -> AutopilotLog:
+def _converted(log: _Topics, name: str, damage: tuple[str, ...]) -> AutopilotLog:
     status = log.fields("vehicle_status")
     vtol = bool(np.any(status.get("is_vtol", np.zeros(1))))
     controls, remarks = control_commands(log.signal, log.parameters, vtol=vtol)
@@ -95,7 +108,7 @@ def _converted(log: _Topics, name: str) -> AutopilotLog:
         outputs=_outputs(log),
         vanes=_vanes(log),
         flown=_flown(log, int(imu.stamp_ns[-1]) if len(imu) else 0),
-        remarks=(*remarks, *airspeed_remarks),
+        remarks=(*remarks, *airspeed_remarks, *damage),
         remedies=_REMEDIES,
     )
 
