@@ -159,7 +159,7 @@ def _without_pauses(signals: Sequence[tuple[Array, Array]]) -> list[tuple[Array,
 
     A clock that was set ahead would otherwise ask for more steps than there is memory.
     """
-    pauses = []
+    pauses: list[tuple[float, float]] = []
     for time, _ in signals:
         long = np.flatnonzero(np.diff(time) > _PAUSE)
         pauses += zip(time[long] + 0.5 * _PAUSE, time[long + 1] - 0.5 * _PAUSE, strict=True)
