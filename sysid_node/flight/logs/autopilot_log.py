@@ -60,3 +60,4 @@ class AutopilotLog:
     flown: Spans | None = None  # in the air as a fixed wing; None: the log does not say
     remarks: tuple[str, ...] = ()
     remedies: Mapping[str, str] = field(default_factory=dict)  # role -> the setting that raises its rate
+    lacks: Mapping[str, str] = field(default_factory=dict)  # role -> what is missing for it, though its message is not

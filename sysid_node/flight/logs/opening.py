@@ -9,6 +9,7 @@ from pathlib import Path
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import flight_record
 from sysid_node.flight.autopilots.base import AdapterSettings
+from sysid_node.flight.autopilots.recorded_topics import autopilot_of
 from sysid_node.flight.bag.reader import open_bag, read_streams, reading
 from sysid_node.flight.commands import JointMessage, read_commands
 from sysid_node.flight.csv import read_csv
@@ -21,7 +22,7 @@ from sysid_node.flight.logs.content import Content, content_of
 from sysid_node.flight.logs.damage import reading_log
 from sysid_node.flight.logs.fractions import between_commands, joints_of_fractions
 from sysid_node.flight.logs.log_streams import LogFlight, flight_of_log
-from sysid_node.flight.logs.readers.autopilot_bag import autopilot_of, read_autopilot_bag
+from sysid_node.flight.logs.readers.autopilot_bag import read_autopilot_bag
 from sysid_node.flight.logs.readers.dataflash import read_dataflash
 from sysid_node.flight.logs.readers.telemetry import read_telemetry
 from sysid_node.flight.logs.readers.ulog import read_ulog

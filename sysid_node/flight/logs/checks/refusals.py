@@ -111,7 +111,7 @@ def missing_airspeed(log: AutopilotLog) -> str:
     if not values.size:
         return f"no {name} in it; connect an airspeed sensor, and log it"
     if not np.isfinite(values).any():
-        return f"{name} never comes from a sensor; connect an airspeed sensor"
+        return log.lacks.get(AIRSPEED) or f"{name} never comes from a sensor; connect an airspeed sensor"
     if float(np.nanmax(values)) < _SLOWEST:
         return f"{name} is {float(np.nanmax(values)):.1f} m/s at most: the airspeed sensor did not work"
     return ""

@@ -35,6 +35,8 @@ _REMEDIES = {
     CONTROLS: "LOG_BITMASK: set bit 13 (RC): RCOU then comes at 25 Hz, which serves for smooth commands, not for steps",
 }
 
+_NO_BARO = "no BARO in it, by whose density ARSP becomes the true airspeed; LOG_BITMASK: set bit 7 (IMU)"
+
 Rows = dict[str, list[dict[str, Any]]]
 
 
@@ -100,6 +102,7 @@ def _converted(rows: Rows, name: str) -> AutopilotLog:
         flown=_flown(rows, int(imu.stamp_ns[-1]) if len(imu) else 0),
         remarks=remarks,
         remedies=_REMEDIES,
+        lacks={} if len(density) else {AIRSPEED: _NO_BARO},
     )
 
 
@@ -174,6 +177,8 @@ def _airspeed(rows: Rows, density: Signal) -> Signal:
     equivalent = _signal(chosen, name, ("Airspeed",))
     healthy = np.array([row.get("H", 1) != 0 for row in chosen], bool)
     equivalent.values[~healthy] = np.nan
+    if not len(density):
+        equivalent.values[:] = np.nan  # it is no true airspeed
     if not len(equivalent) or not len(density):
         return equivalent
     at = np.interp(equivalent.stamp_ns.astype(float), density.stamp_ns.astype(float), density.values[:, 0])

@@ -38,6 +38,10 @@ _IN_AIR, _AS_FIXED_WING = 2, 4  # MAV_LANDED_STATE, MAV_VTOL_STATE
 _RATE = "request the message at a higher rate (MAV_CMD_SET_MESSAGE_INTERVAL), or give the log of the autopilot's card"
 _REMEDIES = {IMU: _RATE, AIRSPEED: _RATE, CONTROLS: _RATE}
 
+_NO_PRESSURE = (
+    "no SCALED_PRESSURE in it, by whose density VFR_HUD's airspeed becomes the true one; request that message, too"
+)
+
 #: Outside temperature (degC) that the density is computed with: telemetry has the board's alone.
 _TEMPERATURE = 15.0
 
@@ -108,6 +112,7 @@ def _converted(rows: Rows, vehicle: tuple[int, int], name: str) -> AutopilotLog:
         flown=flown if vehicle[1] in _WINGED else (),
         remarks=remarks,
         remedies=_REMEDIES,
+        lacks={} if len(density) else {AIRSPEED: _NO_PRESSURE},
     )
 
 
@@ -160,6 +165,8 @@ def _density(rows: Rows, clock: _Clock) -> Signal:
 def _airspeed(rows: Rows, clock: _Clock, density: Signal) -> Signal:
     """True airspeed from VFR_HUD's, which is equivalent."""
     equivalent = _signal(rows["VFR_HUD"], clock, "VFR_HUD", ("airspeed",))
+    if not len(density):
+        equivalent.values[:] = np.nan  # it is no true airspeed
     if not len(equivalent) or not len(density):
         return equivalent
     at = np.interp(equivalent.stamp_ns.astype(float), density.stamp_ns.astype(float), density.values[:, 0])
