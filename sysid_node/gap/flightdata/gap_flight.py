@@ -63,7 +63,7 @@ class GapFlight:
 
 def load_gap_flight(path: Path, aircraft: Aircraft, topics: Mapping[str, str] | None, frame: BodyFrame) -> GapFlight:
     """The flight of a bag or a log. Raises InputError where it is unreadable, lacks a signal or is too short."""
-    if is_table(path):
+    if is_table(path, topics, frame):
         record = checked_force(read_csv(path))
         rate = 1.0 / float(np.median(np.diff(record.time)))
         return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
