@@ -35,6 +35,7 @@ class Mavros(FiveTopics):
     """ArduPlane with MAVROS 2; from recordings also with MAVROS 1, whose topics and types have other names."""
 
     parts = IMU, ATTITUDE, PRESSURE, AIRSPEED, OUTPUTS
+    essential = IMU, AIRSPEED, OUTPUTS
     topics = MappingProxyType(
         {
             IMU: "sensor_msgs/msg/Imu",

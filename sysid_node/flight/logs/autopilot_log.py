@@ -60,4 +60,5 @@ class AutopilotLog:
     flown: Spans | None = None  # in the air as a fixed wing; None: the log does not say
     remarks: tuple[str, ...] = ()
     remedies: Mapping[str, str] = field(default_factory=dict)  # role -> the setting that raises its rate
-    lacks: Mapping[str, str] = field(default_factory=dict)  # role -> what is missing for it, though its message is not
+    lacks: Mapping[str, str] = field(default_factory=dict)  # role -> why it has no usable samples, and what to do
+    unmapped: str = ""  # why the log does not tell which output moves which surface

@@ -100,6 +100,19 @@ def test_the_static_pressure_is_asked_for(tmp_path):
         load_flight_record(tmp_path / "bag", KNOWN)
 
 
+@pytest.mark.parametrize(
+    ("drop", "said"),
+    [
+        (["vfr_hud"], "no /mavros/vfr_hud in it; record it too"),
+        (["rc/out"], "no /mavros/rc/out in it; record it too"),
+        (["imu/data", "imu/data_raw"], "no /mavros/imu/data_raw in it; record it too"),
+    ],
+)
+def test_topics_that_lack_are_asked_for(tmp_path, drop, said):
+    mavros_bag(tmp_path / "bag", seconds=SECONDS, drop=drop)
+    assert survey(tmp_path / "bag", KNOWN).refusal.reasons[0] == said
+
+
 def test_convert_by_the_adapter_takes_the_same_topics(tmp_path):
     """Truth: the flight that is read without ``--autopilot``, whose actuators' map is the same."""
     mavros1_bag(tmp_path / "flight.bag", SECONDS)

@@ -87,6 +87,7 @@ def px4_log(
     aloft: tuple[float, float] | None = None,
     pulses: str = "",
     blocked: tuple[float, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
 ) -> FlightRecord:
     """A ULog of the flight, of PX4 1.11 where ``old``; without ``drop``, its clock ``jump`` s ahead from midway.
 
@@ -95,6 +96,7 @@ def px4_log(
     between which each is out of its range, and ``aloft`` those between which the aircraft flies.
     ``pulses``: the bank, MAIN or AUX, whose pulses are logged in place of the servos' commands. ``blocked``: the times
     (s) between which the airspeed sensor, logged at 50 Hz too, is blocked and not used by PX4.
+    ``parameters`` replace those that the log would hold.
     """
     record = flight()
     us = microseconds(record)
@@ -106,13 +108,13 @@ def px4_log(
         *_px4_controls(us[at["controls"]], fractions(record)[at["controls"]], old=old, elevons=elevons),
         *(_vane(record, at["airspeed"], name, span) for name, span in (vanes or {}).items()),
     ]
-    parameters = {} if old else _px4_parameters(elevons=elevons)
+    stated = {} if old else _px4_parameters(elevons=elevons)
     if blocked is not None:
         topics = [topic for topic in topics if topic.name != "airspeed_validated"]
         topics += _blocked_sensor(record, at["airspeed"], blocked)
     if pulses:
-        topics, stated = _as_pulses(topics, pulses)
-        parameters |= stated
+        topics, of_pulses = _as_pulses(topics, pulses)
+        stated |= of_pulses
     if aloft is not None:
         times = us[0] + np.round(np.array([0.0, *aloft]) * 1e6).astype(np.int64)
         landed = {"landed": ("bool", np.array([True, False, True]))}
@@ -128,7 +130,7 @@ def px4_log(
     kept = [topic for topic in topics if topic.name not in drop]
     release = 0x010B0200 if old else 0x010E0000
     jumping = (lambda time: time + (round(jump * 1e6) if time > middle else 0)) if jump else None
-    write_ulog(path, kept, parameters, release, jumping, vehicle)
+    write_ulog(path, kept, stated | dict(parameters or {}), release, jumping, vehicle)
     return record
 
 
@@ -254,11 +256,13 @@ def dataflash_log(
     drop: tuple[str, ...] = (),
     jump: float = 0.0,
     states: Mapping[str, list[tuple[float, int]]] | None = None,
+    more: Mapping[str, float] | None = None,
 ) -> FlightRecord:
     """A DataFlash log of the flight, with a second IMU that is wrong and not the primary.
 
     ``text`` writes it as text; ``drop`` leaves kinds of messages out, and from midway its clock is ``jump`` s ahead.
     ``states`` are those of "STAT" (isFlying) and "MODE" (its number) from some times on, s.
+    ``more`` are other parameters.
     ``layout`` is one of ``LAYOUTS``, and ``mixing`` the parameters MIXING_*, of which a log without them has none.
     ``start`` is the GPS receiver's time at the first message and ``board`` the line with the board's number.
     """
@@ -269,7 +273,7 @@ def dataflash_log(
     degrees = np.degrees(np.column_stack([record[name] for name in ("phi", "theta", "psi")]))
     equivalent = record["V"] * np.sqrt(record["rho"] / 1.225)
     pulses = pulses_of(fractions(record), layout, mixing or {})
-    parameters = {**_ardupilot_parameters(layout), **(mixing or {})}
+    parameters = {**_ardupilot_parameters(layout), **(mixing or {}), **(more or {})}
     kelvin = 288.15
     rows = {
         "MSG": [(us[0], f"{firmware} (abcd)"), *([(us[0], board)] if board else [])],

@@ -143,7 +143,15 @@ def test_a_sensor_that_px4_does_not_use_is_not_used(tmp_path):
         ({"vehicle_type": 1}, "never flew as a fixed wing"),
         ({"drop": ("airspeed_validated",)}, "no airspeed in it; connect an airspeed sensor"),
         ({"drop": ("sensor_combined",)}, "no sensor_combined in it; SDLOG_PROFILE = 27"),
-        ({"drop": ("actuator_servos",)}, "which output moves which surface is not known"),
+        ({"drop": ("actuator_servos",)}, r"ulg: no actuator_servos in it; SDLOG_PROFILE = 27 logs it in full [^)]*\)$"),
+        (
+            {"drop": ("actuator_controls_0",), "old": True},
+            r"ulg: no actuator_controls_0 in it; SDLOG_PROFILE = 27 logs it in full \([^)]*\)$",
+        ),
+        (
+            {"pulses": "MAIN", "parameters": {"PWM_MAIN_FUNC3": 0}},
+            r"ulg: which output moves which surface is not known \(no actuator_servos in it, and no PWM_MAIN_FUNCn or",
+        ),
         (
             {"rates": PX4_DEFAULT},
             "actuator_servos comes at 10 Hz; 20 Hz are needed; SDLOG_PROFILE = 27",

@@ -28,6 +28,9 @@ _RATE = {
 }
 
 
+_NO_PARAMETERS = "a recording of topics holds no parameters of the outputs"
+
+
 def read_autopilot_bag(path: str | Path, settings: AdapterSettings | None = None) -> AutopilotLog:
     """The signals of a bag of an autopilot's topics. Raises InputError where it is damaged, or holds none of them."""
     path, settings = Path(path), settings or AdapterSettings()
@@ -75,22 +78,25 @@ def _converted(
         controls=LoggedCommands((), absent(said[JointSample], 0)),
         outputs=LoggedCommands(tuple(names), outputs),
         vanes=Signal("vanes", airspeed.stamp_ns, flow) if np.isfinite(flow).any() else None,
-        remarks=("a recording of topics holds no parameters of the outputs", *chosen.remarks),
+        remarks=(_NO_PARAMETERS, *chosen.remarks),
         remedies={IMU: remedy, AIRSPEED: remedy, CONTROLS: remedy},
-        lacks=_without_pressure(ADAPTERS[autopilot], chosen),
+        lacks=_lacks(ADAPTERS[autopilot], chosen),
+        unmapped=_NO_PARAMETERS,
     )
 
 
-def _without_pressure(kind: type[Adapter], chosen: RecordedTopics) -> dict[str, str]:
-    """What the airspeed lacks where the topic with the static pressure was not recorded, in which no density is."""
-    if not issubclass(kind, FiveTopics):
-        return {}
-    _, _, pressure, airspeed, _ = kind.parts
-    if pressure in chosen.sources or airspeed not in chosen.sources:
-        return {}
-    names = [chosen.namespace + name.removeprefix("/mavros") for name in (pressure, airspeed)]
-    text = f"no {names[0]} in it, which makes a true airspeed of {names[1]}; record it too"
-    return {AIRSPEED: text}
+def _lacks(kind: type[Adapter], chosen: RecordedTopics) -> dict[str, str]:
+    """What was not recorded, by role: also the static pressure, without which there is no density, nor an airspeed."""
+    names = {ours: chosen.namespace + ours.removeprefix("/mavros") for ours in kind.topics}
+    lacking = {
+        role: f"no {names[ours]} in it; record it too"
+        for role, ours in zip((IMU, AIRSPEED, CONTROLS), kind.essential, strict=True)
+        if ours not in chosen.sources
+    }
+    if issubclass(kind, FiveTopics) and kind.parts[2] not in chosen.sources and AIRSPEED not in lacking:
+        pressure, airspeed = names[kind.parts[2]], chosen.sources[kind.parts[3]]
+        lacking[AIRSPEED] = f"no {pressure} in it, which makes a true airspeed of {airspeed}; record it too"
+    return lacking
 
 
 #: What each kind of sample is called where its topic is not recorded.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +87,7 @@ def _converted(rows: Rows, name: str) -> AutopilotLog:
     parameters = {row["Name"]: float(row["Value"]) for row in rows["PARM"]}
     outputs = _outputs(rows)
     controls, remarks = control_commands(outputs, parameters)
+    unmapped, remedies = remarks, _remedies(parameters)
     imu, attitude = _imu(rows, parameters), _attitude(rows)
     density = _density(rows)
     if rows["AOA"]:
@@ -101,9 +103,26 @@ def _converted(rows: Rows, name: str) -> AutopilotLog:
         outputs=outputs,
         flown=_flown(rows, int(imu.stamp_ns[-1]) if len(imu) else 0),
         remarks=remarks,
-        remedies=_REMEDIES,
-        lacks={} if len(density) else {AIRSPEED: _NO_BARO},
+        remedies=remedies,
+        lacks=_lacks(outputs, density, remedies),
+        unmapped="; ".join(unmapped),
     )
+
+
+def _lacks(outputs: LoggedCommands, density: Signal, remedies: Mapping[str, str]) -> dict[str, str]:
+    lacking = {} if len(density) else {AIRSPEED: _NO_BARO}
+    return lacking if len(outputs.signal) else {**lacking, CONTROLS: f"no RCOU in it; {remedies[CONTROLS]}"}
+
+
+def _remedies(parameters: Mapping[str, float]) -> dict[str, str]:
+    """What raises the rate of each signal: bits of LOG_BITMASK that are not set yet, or what else slows it down."""
+    mask = int(parameters.get("LOG_BITMASK", 0))
+    found = dict(_REMEDIES)
+    if mask & 129 == 129:
+        found[IMU] = "LOG_BITMASK has bits 0 and 7 set; raise SCHED_LOOP_RATE, or look for dropped messages (DSF.Dp)"
+    if mask >> 13 & 1:
+        found[CONTROLS] = "LOG_BITMASK has bit 13 (RC) set, which gives 25 Hz at most; look for dropped messages"
+    return found
 
 
 def _firmware(rows: Rows) -> str:

@@ -58,6 +58,9 @@ def control_commands(topic: Topic, parameters: Parameters, *, vtol: bool) -> tup
         servos = _servos_of_pulses(topic, parameters, count)
     if count and len(servos):
         return _from_servos(topic, parameters, servos, vtol=vtol)
+    if count:
+        remark = "no actuator_servos in it, and no PWM_MAIN_FUNCn or PWM_AUX_FUNCn of actuator_outputs names each servo"
+        return LoggedCommands((), absent("actuator_servos", 0)), (remark,)
     return _from_axes(topic, vtol=vtol)
 
 

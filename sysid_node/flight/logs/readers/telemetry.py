@@ -94,11 +94,15 @@ def _converted(rows: Rows, vehicle: tuple[int, int], name: str) -> AutopilotLog:
     parameters = {row.fields["param_id"]: float(row.fields["param_value"]) for row in rows["PARAM_VALUE"]}
     outputs = _outputs(rows, clock)
     controls, remarks = control_commands(outputs, parameters)
+    unmapped = remarks
     imu = _imu(rows, clock)
     density = _density(rows, clock)
     remarks += (
         f"air density: from the static pressure at {_TEMPERATURE:g} degC, as telemetry has no outside temperature",
     )
+    lacking = {} if len(density) else {AIRSPEED: _NO_PRESSURE}
+    if not len(outputs.signal):
+        lacking[CONTROLS] = f"no SERVO_OUTPUT_RAW in it; {_RATE}"
     flown = _flown(rows, clock, int(imu.stamp_ns[-1]) if len(imu) else 0)
     return AutopilotLog(
         name=name,
@@ -112,7 +116,8 @@ def _converted(rows: Rows, vehicle: tuple[int, int], name: str) -> AutopilotLog:
         flown=flown if vehicle[1] in _WINGED else (),
         remarks=remarks,
         remedies=_REMEDIES,
-        lacks={} if len(density) else {AIRSPEED: _NO_PRESSURE},
+        lacks=lacking,
+        unmapped="; ".join(unmapped),
     )
 
 

@@ -91,6 +91,7 @@ def _converted(log: _Topics, name: str, damage: tuple[str, ...]) -> AutopilotLog
     vtol = bool(np.any(status.get("is_vtol", np.zeros(1))))
     controls, remarks = control_commands(log.signal, log.parameters, vtol=vtol)
     airspeed, airspeed_remarks = _airspeed(log)
+    unmapped, outputs = "; ".join(remarks), _outputs(log)
     imu = _imu(log)
     dropped = sum(dropout.duration for dropout in log.ulog.dropouts) / 1000.0
     if dropped:
@@ -105,12 +106,20 @@ def _converted(log: _Topics, name: str, damage: tuple[str, ...]) -> AutopilotLog
         airspeed=airspeed,
         density=log.signal("vehicle_air_data", ("rho",)),
         controls=controls,
-        outputs=_outputs(log),
+        outputs=outputs,
         vanes=_vanes(log),
         flown=_flown(log, int(imu.stamp_ns[-1]) if len(imu) else 0),
         remarks=(*remarks, *airspeed_remarks, *damage),
         remedies=_REMEDIES,
+        lacks=_lacks(controls, outputs),
+        unmapped=unmapped,
     )
+
+
+def _lacks(controls: LoggedCommands, outputs: LoggedCommands) -> dict[str, str]:
+    """Commands that were not logged at all: those of motors alone move no surface."""
+    surfaces = [name for name in outputs.names if not name.startswith("motor")]
+    return {} if controls.names or surfaces else {CONTROLS: f"no {controls.signal.source} in it; {_PROFILE}"}
 
 
 def _version(ulog: Any) -> str:
