@@ -122,6 +122,8 @@ FLIGHTS = {
     "a table": (table, True, ("replay", "identify", "gap")),
     "a table at 10 Hz": (lambda folder: table(folder, rate=10.0), True, ("replay", "identify", "gap")),
     "a short table": (lambda folder: table(folder, seconds=3.0), True, ("replay", "identify")),
+    "a very short table": (lambda folder: table(folder, rate=200.0, seconds=0.9), True, ()),
+    "a table of a second": (lambda folder: table(folder, rate=200.0, seconds=1.2), True, ("replay", "identify")),
     "a longitudinal table": (lambda folder: lacking(folder, "ay", "p", "r", "beta", "da", "dr"), True, ("gap",)),
     "a table without rudder": (lambda folder: lacking(folder, "dr"), True, ()),
     "a table without density": (lambda folder: lacking(folder, "rho"), True, ("replay", "identify")),
