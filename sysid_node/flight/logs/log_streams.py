@@ -8,7 +8,7 @@ import numpy as np
 
 from sysid_node.flight.autopilots.joints import joints_of
 from sysid_node.flight.logs.air_data import air_data, attitude_at
-from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, Signal
+from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, Signal, with_outputs_of
 from sysid_node.flight.logs.checks.refusals import Refusal, missing_signals, require
 from sysid_node.flight.logs.flown import seconds, within
 from sysid_node.flight.streams import (
@@ -37,6 +37,7 @@ def flight_of_log(log: AutopilotLog, outputs: str = "", key: str = "outputs") ->
     the actuators are fractions of full command. Raises InputError where a signal is missing or nothing was flown, or
     where ``outputs``, which ``key`` states, are wrong.
     """
+    log = with_outputs_of(log, outputs)
     require(log.name, Refusal(missing_signals(log, raw_outputs=bool(outputs))))
     imu = _flown_part(log, log.imu)
     airspeed = _flown_part(log, log.airspeed)

@@ -18,7 +18,7 @@ from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.live.mean_force import checked_force
 from sysid_node.flight.live.mean_lift import checked_lift
-from sysid_node.flight.logs.autopilot_log import AutopilotLog
+from sysid_node.flight.logs.autopilot_log import AutopilotLog, with_outputs_of
 from sysid_node.flight.logs.checks.refusals import refusal_of_log, refusal_of_streams, require
 from sysid_node.flight.logs.content import Content, content_of, remapped, say_that_axes_are_known
 from sysid_node.flight.logs.damage import reading_log
@@ -84,6 +84,7 @@ def open_streams(
     log = None if other_topics else read_autopilot_log(path)
     if log is not None:
         say_that_axes_are_known(path, frame, f"log of {log.autopilot}")
+        log = with_outputs_of(log, aircraft.outputs)
         require(log.name, refusal_of_log(log, raw_outputs=bool(aircraft.outputs)))
         key = f"aircraft {aircraft.name}: outputs"
         require_known(aircraft.outputs, joint_names(aircraft), f"aircraft {aircraft.name}", key)

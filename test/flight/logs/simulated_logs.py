@@ -88,6 +88,7 @@ def px4_log(
     pulses: str = "",
     blocked: tuple[float, float] | None = None,
     parameters: Mapping[str, float] | None = None,
+    slow_outputs: float = 0.0,
 ) -> FlightRecord:
     """A ULog of the flight, of PX4 1.11 where ``old``; without ``drop``, its clock ``jump`` s ahead from midway.
 
@@ -96,7 +97,8 @@ def px4_log(
     between which each is out of its range, and ``aloft`` those between which the aircraft flies.
     ``pulses``: the bank, MAIN or AUX, whose pulses are logged in place of the servos' commands. ``blocked``: the times
     (s) between which the airspeed sensor, logged at 50 Hz too, is blocked and not used by PX4.
-    ``parameters`` replace those that the log would hold.
+    ``parameters`` replace those that the log would hold. ``slow_outputs``: a rate, Hz, at which the pulses of outputs
+    that stand still are logged, too.
     """
     record = flight()
     us = microseconds(record)
@@ -112,6 +114,10 @@ def px4_log(
     if blocked is not None:
         topics = [topic for topic in topics if topic.name != "airspeed_validated"]
         topics += _blocked_sensor(record, at["airspeed"], blocked)
+    if slow_outputs:
+        still = picked(record, slow_outputs)
+        pulses_held = {"output[16]": ("float", np.full((still.size, 16), 1500.0))}
+        topics.append(Topic("actuator_outputs", us[still], pulses_held))
     if pulses:
         topics, of_pulses = _as_pulses(topics, pulses)
         stated |= of_pulses

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from simulated_logs import FULL_RATES, PX4_DEFAULT, aircraft, px4_log
+from simulated_logs import FULL, FULL_RATES, PX4_DEFAULT, aircraft, px4_log
 
 from sysid_node.errors import InputError
 from sysid_node.flight.align import flight_record
+from sysid_node.flight.logs.checks.survey import survey
 from sysid_node.flight.logs.opening import load_flight_record, open_log, open_streams, read_autopilot_log
 from sysid_node.flight.streams import COMMANDS
 
@@ -193,6 +194,20 @@ def test_truncated_and_damaged_logs(tmp_path):
         assert load_flight_record(tmp_path / "damaged.ulg", aircraft()).duration > 0.2 * record.duration
     except InputError as error:
         assert "\n" not in str(error)
+
+
+def test_outputs_are_at_the_times_of_the_bank_that_is_named(tmp_path):
+    """Truth: the record. The servos are logged at 100 Hz, the pulses of actuator_outputs at 10 Hz."""
+    record = px4_log(tmp_path / "flight.ulg", slow_outputs=10.0)
+    words = [f"{name}=servo{i}:0:{-FULL[name]}" for name, i in (("aileron", 2), ("elevator", 3), ("rudder", 4))]
+    known = replace(aircraft(), outputs=f"{' '.join(words)} throttle=motor1:0:1")
+    back = load_flight_record(tmp_path / "flight.ulg", known)
+    at = np.searchsorted(record.time, record.time[0] + back.time + 1e-4) - 1
+    for name in ("de", "da", "dr"):
+        np.testing.assert_allclose(back[name], record[name][at], atol=1e-5, err_msg=name)
+    rows = {row.signal: row for row in survey(tmp_path / "flight.ulg", known).rows}
+    assert rows["controls"].source == "actuator_servos"
+    assert rows["controls"].rate == pytest.approx(100.0, rel=1e-3)
 
 
 def test_the_deflection_at_full_command_is_asked_for(tmp_path):

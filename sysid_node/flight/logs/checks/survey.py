@@ -14,7 +14,7 @@ from sysid_node.flight.align import STEP_BACK_NS
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
-from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, AutopilotLog, Signal
+from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, AutopilotLog, Signal, with_outputs_of
 from sysid_node.flight.logs.autopilot_log import IMU as IMU_ROLE
 from sysid_node.flight.logs.checks.excitation import excitation
 from sysid_node.flight.logs.checks.inputs import Inputs, inputs_of_joints, inputs_of_log
@@ -157,6 +157,7 @@ def _not_whole(record: FlightRecord) -> tuple[str, ...]:
 
 def _of_log(log: AutopilotLog, aircraft: Aircraft | None) -> _Signals:
     raw = bool(aircraft.outputs) if aircraft is not None else False
+    log = with_outputs_of(log, aircraft.outputs) if aircraft is not None else log
     set_back = clock_faults(log, raw_outputs=raw)
     spans = None if set_back else log.flown or None  # no time of a clock that was set tells when it flew
 

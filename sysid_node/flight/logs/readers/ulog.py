@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 
 from sysid_node.errors import InputError
-from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, LoggedCommands, Signal, absent
+from sysid_node.flight.logs.autopilot_log import (
+    AIRSPEED,
+    CONTROLS,
+    IMU,
+    AutopilotLog,
+    LoggedCommands,
+    Signal,
+    absent,
+    joined,
+)
 from sysid_node.flight.logs.flown import Condition, Spans, spans_where
 from sysid_node.flight.logs.readers.packages import quietly, required
 from sysid_node.flight.logs.readers.px4_controls import control_commands
@@ -91,7 +100,8 @@ def _converted(log: _Topics, name: str, damage: tuple[str, ...]) -> AutopilotLog
     vtol = bool(np.any(status.get("is_vtol", np.zeros(1))))
     controls, remarks = control_commands(log.signal, log.parameters, vtol=vtol)
     airspeed, airspeed_remarks = _airspeed(log)
-    unmapped, outputs = "; ".join(remarks), _outputs(log)
+    unmapped, banks = "; ".join(remarks), _banks(log)
+    outputs = joined(banks, banks[0].signal if banks else absent("actuator_outputs", 0))
     imu = _imu(log)
     dropped = sum(dropout.duration for dropout in log.ulog.dropouts) / 1000.0
     if dropped:
@@ -107,6 +117,7 @@ def _converted(log: _Topics, name: str, damage: tuple[str, ...]) -> AutopilotLog
         density=log.signal("vehicle_air_data", ("rho",)),
         controls=controls,
         outputs=outputs,
+        banks=banks,
         vanes=_vanes(log),
         flown=_flown(log, int(imu.stamp_ns[-1]) if len(imu) else 0),
         remarks=(*remarks, *airspeed_remarks, *damage),
@@ -213,24 +224,18 @@ def _at_times(signal: Signal, other: Signal) -> Array:
     return values
 
 
-def _outputs(log: _Topics) -> LoggedCommands:
+def _banks(log: _Topics) -> tuple[LoggedCommands, ...]:
     """The outputs by the names in the aircraft file: main1.., aux1.. (pulses), servo1.., motor1.. (-1..1)."""
     banks = {"main": log.signal("actuator_outputs", tuple(f"output[{i}]" for i in range(8)))}
     if ("actuator_outputs", 1) in log.data:
         banks["aux"] = log.signal("actuator_outputs/1", tuple(f"output[{i}]" for i in range(8)))
     banks["servo"] = log.signal("actuator_servos", tuple(f"control[{i}]" for i in range(8)))
     banks["motor"] = log.signal("actuator_motors", tuple(f"control[{i}]" for i in range(12)))
-    base = next((bank for bank in banks.values() if len(bank)), absent("actuator_outputs", 0))
-    names: list[str] = []
-    columns: list[Array] = []
-    for bank, signal in banks.items():
-        if not len(signal):
-            continue
-        place = np.clip(np.searchsorted(signal.stamp_ns, base.stamp_ns, side="right") - 1, 0, len(signal) - 1)
-        names += [f"{bank}{i + 1}" for i in range(signal.values.shape[1])]
-        columns += list(signal.values[place].T)
-    values = np.column_stack(columns) if columns else np.empty((0, 0))
-    return LoggedCommands(tuple(names), Signal(base.source, base.stamp_ns, values))
+    return tuple(
+        LoggedCommands(tuple(f"{bank}{i + 1}" for i in range(signal.values.shape[1])), signal)
+        for bank, signal in banks.items()
+        if len(signal)
+    )
 
 
 def _flown(log: _Topics, end_ns: int) -> Spans | None:
