@@ -15,6 +15,7 @@ from sysid_node.flight.autopilots.base import GAS_CONSTANT, SEA_LEVEL_DENSITY
 from sysid_node.flight.frames import quaternion_from_euler
 from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, LoggedCommands, Signal, absent
 from sysid_node.flight.logs.flown import Condition, Spans, spans_where
+from sysid_node.flight.logs.outliers import in_order, said_of
 from sysid_node.flight.logs.readers.ardupilot_controls import control_commands
 from sysid_node.flight.logs.readers.packages import quietly, required
 from sysid_node.flight.record import Array
@@ -52,7 +53,18 @@ def read_dataflash(path: str | Path, *, text: bool = False) -> AutopilotLog:
     except Exception as error:  # the parser of a damaged file raises all kinds of exceptions
         words = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path.name}: cannot be read as an ArduPilot log: {words}; copy it again") from error
-    return _converted(rows, path.name)
+    return _converted(*_without_outliers(rows), path.name)
+
+
+def _without_outliers(rows: Rows) -> tuple[Rows, int]:
+    """The messages without single ones of another time, and how many those were."""
+    kept, count = defaultdict(list, rows), 0
+    for kind, of_kind in rows.items():
+        if of_kind and "TimeUS" in of_kind[0]:
+            keep = in_order(np.array([int(row["TimeUS"]) for row in of_kind], np.int64) * 1000)
+            kept[kind] = [row for row, fits in zip(of_kind, keep.tolist(), strict=True) if fits]
+            count += len(of_kind) - len(kept[kind])
+    return kept, count
 
 
 def _advancing(reader: Any) -> Any:
@@ -83,7 +95,7 @@ def _rows(log: Any) -> Rows:
         rows[fields.pop("mavpackettype")].append(fields)
 
 
-def _converted(rows: Rows, name: str) -> AutopilotLog:
+def _converted(rows: Rows, left_out: int, name: str) -> AutopilotLog:
     parameters = {row["Name"]: float(row["Value"]) for row in rows["PARM"]}
     outputs = _outputs(rows)
     controls, remarks = control_commands(outputs, parameters)
@@ -102,7 +114,7 @@ def _converted(rows: Rows, name: str) -> AutopilotLog:
         controls=controls,
         outputs=outputs,
         flown=_flown(rows, int(imu.stamp_ns[-1]) if len(imu) else 0),
-        remarks=remarks,
+        remarks=remarks + said_of(left_out),
         remedies=remedies,
         lacks=_lacks(outputs, density, remedies),
         unmapped="; ".join(unmapped),

@@ -20,6 +20,7 @@ from sysid_node.flight.logs.autopilot_log import (
     joined,
 )
 from sysid_node.flight.logs.flown import Condition, Spans, spans_where
+from sysid_node.flight.logs.outliers import in_order, said_of
 from sysid_node.flight.logs.readers.packages import quietly, required
 from sysid_node.flight.logs.readers.px4_controls import control_commands
 from sysid_node.flight.record import Array
@@ -68,6 +69,11 @@ class _Topics:
     def __init__(self, ulog: Any) -> None:
         self.ulog = ulog
         self.data = {(one.name, one.multi_id): one.data for one in ulog.data_list}
+        self.left_out = 0  # messages
+        for key, columns in self.data.items():
+            keep = in_order(np.asarray(columns["timestamp"], np.int64) * 1000)
+            self.left_out += int(np.count_nonzero(~keep))
+            self.data[key] = columns if keep.all() else {name: values[keep] for name, values in columns.items()}
         self.parameters: dict[str, float] = {name: float(value) for name, value in ulog.initial_parameters.items()}
 
     def fields(self, topic: str) -> dict[str, Array]:
@@ -120,7 +126,7 @@ def _converted(log: _Topics, name: str, damage: tuple[str, ...]) -> AutopilotLog
         banks=banks,
         vanes=_vanes(log),
         flown=_flown(log, int(imu.stamp_ns[-1]) if len(imu) else 0),
-        remarks=(*remarks, *airspeed_remarks, *damage),
+        remarks=(*remarks, *airspeed_remarks, *damage, *said_of(log.left_out)),
         remedies=_REMEDIES,
         lacks=_lacks(controls, outputs),
         unmapped=unmapped,
