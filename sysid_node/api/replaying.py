@@ -35,7 +35,7 @@ from sysid_node.online.alignment.in_pieces import AlignedSamples, PieceAlignment
 from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_covariance
 from sysid_node.online.estimates.log import EstimatesLog
 from sysid_node.online.estimates.published import estimate
-from sysid_node.online.settings import OnlineSettings
+from sysid_node.online.settings import FIRST_ESTIMATE, OnlineSettings, too_short_to_replay
 from sysid_node.online.types import AZ, LIFT, Estimates
 from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.files.runs.estimates_bag import write_estimates
@@ -183,6 +183,7 @@ class _Run:
         self.spans: dict[str, tuple[float, float]] = {}  # s, by topic
         self.joints: tuple[str, ...] = ()
         self.commands_from, self.frame_id = math.inf, ""
+        self.began = math.inf  # s
         self.done = 0  # messages
 
     def take(self, piece: FlightPiece) -> None:
@@ -197,6 +198,7 @@ class _Run:
         self.spans = joined_spans(self.spans, stamp_spans(streams))
         count = sum(len(stream.arrival) for stream in streams.by_topic.values())
         aligned, known = self.alignment.take(streams, last=piece.last), len(self.stamps)
+        self.began = min(self.began, float(aligned.time[0])) if aligned.time.size else self.began
         self.force.add(aligned.time, aligned.samples[:, AZ])
         self.lift.add(aligned.time, *aligned.samples[:, LIFT].T)
         if piece.last:
@@ -247,6 +249,10 @@ class _Run:
             Actuation.of(self.aircraft).require(self.joints, self.flight.name)
             raise InputError(why_nothing_aligned(self.flight.name, self.spans, rejected))
         estimator.complete(self.state)  # no further sample gives it time
+        final = estimate(self.state, last)
+        seconds = last - self.began
+        if seconds < FIRST_ESTIMATE and not any(math.isfinite(d.value) for d in final.derivatives.values()):
+            raise InputError(too_short_to_replay(self.flight.name, seconds))
         self.progress(1.0, _FAULTS[2] if self.monitor is not None else _IDENTIFYING[2])
         return Replay(
             aircraft=self.aircraft,
@@ -258,7 +264,7 @@ class _Run:
             rejected=counts_by_reason(rejected),
             history=self.history,
             stamps_ns=np.array(self.stamps, np.int64),
-            final=estimate(self.state, last),
+            final=final,
             frame_id=self.frame_id,
             truth=truth,
             covariance=estimate_covariance(self.state),

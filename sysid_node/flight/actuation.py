@@ -98,6 +98,12 @@ class Actuation:
             )
 
 
+def joint_names(aircraft: Aircraft) -> tuple[str, ...]:
+    """The joints that an aircraft has, with its throttle's, each once."""
+    joints = [joint for control in aircraft.controls.values() for joint in control.joints]
+    return tuple(dict.fromkeys([*joints, *([aircraft.throttle.joint] if aircraft.throttle else [])]))
+
+
 def _few(names: Sequence[str]) -> str:
     """The first names, and how many more there are."""
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""

@@ -21,7 +21,7 @@ from sysid_node.flight.bag.raw_messages import read_messages, read_pieces
 from sysid_node.flight.bag.reader import RecordingWatch, decoded, input_connections, open_bag, reading
 from sysid_node.flight.commands import JointMessage, command_connections, decoded_commands
 from sysid_node.flight.frames import BodyFrame
-from sysid_node.flight.logs.content import Content, content_of
+from sysid_node.flight.logs.content import Content, content_of, remapped
 from sysid_node.flight.logs.opening import is_autopilot_bag, open_streams, recorded_commands
 from sysid_node.flight.streams import Streams
 from sysid_node.flight.topics import IMU, topic_names
@@ -60,8 +60,7 @@ def flight_pieces(
 
     Raises InputError as ``open_streams`` does, and while pieces are taken, where the bag turns out to be damaged.
     """
-    remapped = topics is not None and dict(topics) != topic_names()
-    if content_of(path) is not Content.ROSBAG2 or (not remapped and is_autopilot_bag(path)):
+    if content_of(path) is not Content.ROSBAG2 or (not remapped(path, topics) and is_autopilot_bag(path)):
         yield _whole(path, aircraft, topics, frame)
         return
     with open_bag(path) as reader:

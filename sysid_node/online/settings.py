@@ -14,7 +14,16 @@ from sysid_node.suggestion import did_you_mean
 METHODS = ("sls_rft", "iv_rft")
 MOST_LINES = 1000
 LONGEST_GAP = 5.0  # s
+#: Before so much flight, s, nothing is estimated.
+FIRST_ESTIMATE = 1.0
+
 SHORTEST_MEMORY, LONGEST_MEMORY = 1.0, 1e6  # s
+
+
+def too_short_to_replay(flight: str, seconds: float) -> str:
+    """The message that a flight holds no estimate."""
+    first = f"the first estimate comes after {FIRST_ESTIMATE:g} s"
+    return f"{flight}: {seconds:.2g} s of flight; {first}; give a longer flight"
 
 
 @dataclass(frozen=True)

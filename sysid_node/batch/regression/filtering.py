@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.signal import butter, sosfiltfilt
 
 from sysid_node.flight.record import Array, FlightRecord
+
+#: No slope is taken across a step of more than this many usual ones, and of more than 0.1 s.
+_GAP_STEPS, _GAP = 5.0, 0.1
+
+
+def pieces(time: Array) -> list[slice]:
+    """The parts of a flight between interruptions: steps of more than five usual ones, and of more than 0.1 s."""
+    steps = np.diff(time)
+    longest = max(_GAP_STEPS * float(np.median(steps)), _GAP) if steps.size else 0.0
+    edges = [0, *(np.flatnonzero(steps > longest) + 1).tolist(), time.size]
+    return [slice(first, last) for first, last in pairwise(edges)]
 
 
 def differentiate(time: Array, x: Array, half_width: int = 2, degree: int = 4) -> Array:
@@ -15,9 +28,19 @@ def differentiate(time: Array, x: Array, half_width: int = 2, degree: int = 4) -
     The samples may be unevenly spaced. Two samples either side and degree 4 give the fourth-order central difference
     (no smoothing, no bias in the band of flight); a wider window or a lower degree smooths (Savitzky & Golay, 1964;
     Klein & Morelli, 2006, sec. 11.2). The ends are
-    extended by point reflection.
+    extended by point reflection. No slope is taken across an interruption (``pieces``), either side of which is an end,
+    and a sample alone between two of them has none: NaN.
     """
-    h = half_width
+    parts = [_slope(time[part], x[part], half_width, degree) for part in pieces(time)]
+    return np.concatenate(parts)
+
+
+def _slope(time: Array, x: Array, half_width: int, degree: int) -> Array:
+    """The derivative of a part without interruptions, on fewer samples where it has few."""
+    if time.size < 2:
+        return np.full(time.size, np.nan)
+    h = min(half_width, time.size - 1)
+    degree = min(degree, 2 * h)
     t = np.concatenate([2.0 * time[0] - time[h:0:-1], time, 2.0 * time[-1] - time[-2 : -h - 2 : -1]])
     y = np.concatenate([2.0 * x[0] - x[h:0:-1], x, 2.0 * x[-1] - x[-2 : -h - 2 : -1]])
     around = sliding_window_view(t, 2 * h + 1) - time[:, None]

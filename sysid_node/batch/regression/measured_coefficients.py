@@ -18,7 +18,7 @@ import numpy as np
 
 from sysid_node.aircraft.model import Aircraft, LookupTable
 from sysid_node.aircraft.stated_effects import stated_cg
-from sysid_node.batch.regression.filtering import differentiate
+from sysid_node.batch.regression.filtering import differentiate, pieces
 from sysid_node.dynamics import scalar
 from sysid_node.dynamics.airflow import speed_of
 from sysid_node.dynamics.coefficients import regressors, with_polar
@@ -189,12 +189,14 @@ def _check_measured(aircraft: Aircraft, record: FlightRecord) -> None:
 def _complete_samples(aircraft: Aircraft, record: FlightRecord) -> tuple[FlightRecord, int]:
     """The samples in flight with every needed value, and how many others there were.
 
-    Density is the reference's if unknown.
+    Density is the reference's if unknown. A sample alone between interruptions has no angular acceleration.
     """
     optional = [name for name in ("alpha", "beta", "rho", "thrust") if record.measured(name)]
     names = list(dict.fromkeys([*_needed(aircraft), *optional]))
     slowest = _SLOWEST * aircraft.reference.airspeed
     kept = np.all([np.isfinite(record[name]) for name in names], axis=0) & (record["V"] > slowest)
+    alone = [part.start for part in pieces(record.time[kept]) if part.stop == part.start + 1]
+    kept[np.flatnonzero(kept)[alone]] = False
     if kept.sum() < 10:
         raise InputError(
             f"flight {record.name!r}: only {int(kept.sum())} of {len(record)} samples hold all of {', '.join(names)} "

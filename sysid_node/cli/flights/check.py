@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import traceback
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,7 +42,12 @@ def run(args: argparse.Namespace) -> None:
             refused = refusals_told(found) if aircraft is None else refusals_tried(path, aircraft, topics, frame)
             _show(found, verdicts(found, refused, aircraft_known=aircraft is not None))
         except InputError as error:
-            unread.append(str(error))
+            text = str(error)
+            unread.append(text if path.name in text else f"{path.name}: {text}")
+        except Exception as error:  # a fault of a reader must not hide the other files
+            if args.debug:
+                traceback.print_exc()
+            unread.append(f"{path.name}: failed: {type(error).__name__}: {error} (more with --debug)")
     if unread:
         raise InputError("; ".join(unread))
 

@@ -11,13 +11,15 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.shared import options
 from sysid_node.errors import InputError
+from sysid_node.flight.actuation import joint_names
 from sysid_node.flight.autopilots.base import AdapterSettings, adapter_for
+from sysid_node.flight.autopilots.joints import require_known
 from sysid_node.flight.autopilots.known import ADAPTERS
 from sysid_node.flight.autopilots.recorded import read_recorded
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import STORAGES, write_streams
 from sysid_node.flight.csv import read_csv
-from sysid_node.flight.logs.content import Content, content_of
+from sysid_node.flight.logs.content import Content, content_of, remapped
 from sysid_node.flight.logs.fractions import joints_of_fractions
 from sysid_node.flight.logs.log_streams import LogFlight
 from sysid_node.flight.logs.opening import open_log
@@ -44,12 +46,8 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     parser.add_argument(
         "--joints", default="", help="which output moves which joint, NAME=OUTPUT:TRIM:SCALE ... in one argument"
     )
-    parser.add_argument(
-        "--air-temperature", type=float, default=AdapterSettings.air_temperature, help="of a bag: degC (default: 15)"
-    )
-    parser.add_argument(
-        "--air-data-delay", type=float, default=AdapterSettings.air_data_delay, help="of a bag: s (default: 0)"
-    )
+    parser.add_argument("--air-temperature", type=float, help="of a bag of an autopilot's topics: degC (default: 15)")
+    parser.add_argument("--air-data-delay", type=float, help="of a bag of an autopilot's topics: s (default: 0)")
     parser.add_argument("--storage", choices=list(STORAGES), default="mcap", help="default: mcap")
     options.add_reading(parser)
     return parser
@@ -85,14 +83,41 @@ def _show(out: Path, flight: LogFlight) -> None:
 
 def _opened(args: argparse.Namespace, aircraft: Aircraft | None) -> LogFlight:
     """The flight as streams: of an autopilot's log or bag, of a table, or of a bag of our own topics."""
-    settings = AdapterSettings(args.joints, args.air_temperature, args.air_data_delay)
     content = content_of(args.log)
-    if args.autopilot and content is Content.ROSBAG2:
-        return LogFlight(read_recorded(args.log, adapter_for(args.autopilot, ADAPTERS, settings)), ())
-    if content is Content.TABLE and not args.topic:
-        return LogFlight(streams_from_record(read_csv(args.log), aircraft), ())
+    topics = topic_names(args.topic)
+    other_topics = remapped(args.log, topics)
+    _refuse_idle(args, content, own=other_topics)
+    settings = AdapterSettings(
+        args.joints,
+        AdapterSettings.air_temperature if args.air_temperature is None else args.air_temperature,
+        AdapterSettings.air_data_delay if args.air_data_delay is None else args.air_data_delay,
+    )
     outputs = args.joints or (aircraft.outputs if aircraft is not None else "")
-    flight = None if args.topic else open_log(args.log, settings, outputs)
-    if flight is None and args.joints:
-        raise InputError(f"{args.log}: --joints is for a log or a bag of an autopilot")
-    return flight or LogFlight(read_streams(args.log, topic_names(args.topic), args.body_frame), ())
+    key = "--joints" if args.joints or aircraft is None else f"aircraft {aircraft.name}: outputs"
+    if aircraft is not None:
+        require_known(outputs, joint_names(aircraft), f"aircraft {aircraft.name}", key)
+    if args.autopilot:
+        return LogFlight(read_recorded(args.log, adapter_for(args.autopilot, ADAPTERS, settings)), ())
+    if content is Content.TABLE:
+        return LogFlight(streams_from_record(read_csv(args.log), aircraft), ())
+    flight = None if other_topics else open_log(args.log, settings, outputs, key)
+    if flight is None:
+        _refuse_idle(args, content, own=True)
+    return flight or LogFlight(read_streams(args.log, topics, args.body_frame), ())
+
+
+def _refuse_idle(args: argparse.Namespace, content: Content, *, own: bool) -> None:
+    """Raise InputError where an option cannot act on the log, a bag of our ``own`` topics or of another content."""
+    given = {
+        "--joints": bool(args.joints),
+        "--autopilot": args.autopilot is not None,
+        "--air-temperature": args.air_temperature is not None,
+        "--air-data-delay": args.air_data_delay is not None,
+    }
+    is_bag = content in (Content.ROSBAG1, Content.ROSBAG2)
+    what = "a bag of our own topics" if own else f"a {content.value}"
+    for option, stated in given.items():
+        acts = not own and (is_bag or (option == "--joints" and content is not Content.TABLE))
+        if stated and not acts:
+            whose = "a log or a bag of an autopilot" if option == "--joints" else "a bag of an autopilot's topics"
+            raise InputError(f"{option} is for {whose}; {args.log} is {what}; leave it out")

@@ -21,11 +21,14 @@ from sysid_node.flight.logs.checks.survey import FULL_DEFLECTION, OUTPUTS, LogSu
 from sysid_node.flight.logs.opening import carried_by, load_flight_record
 from sysid_node.flight.pieces import flight_pieces
 from sysid_node.online.alignment.in_pieces import PieceAlignment
-from sysid_node.online.settings import OnlineSettings
+from sysid_node.online.settings import FIRST_ESTIMATE, OnlineSettings, too_short_to_replay
 from sysid_node.online.types import AZ, LIFT
 
 #: The shortest flight that ``sysid gap`` diagnoses, s (``gap.flightdata.gap_flight``, which takes long to load).
 SHORTEST_FOR_GAP = 6.0
+
+#: In less flight, s, no equation of five unknowns is determined below 3 Hz (``batch.regression.effective_length``).
+SHORTEST_TO_IDENTIFY = 1.0
 
 _KEYS = {
     OUTPUTS: "outputs (which output moves which joint)",
@@ -49,8 +52,10 @@ def refusals_told(found: LogSurvey) -> dict[str, str]:
     short = "" if found.uninterrupted >= SHORTEST_FOR_GAP else _too_short(found.uninterrupted)
     lacks = f"no complete {', '.join(found.gap_lacks)}; the gap cannot be measured without" if found.gap_lacks else ""
     gap = whole or lacks or short
-    replay = always or found.incomplete
-    return {"replay": replay, "identify": whole or found.incomplete, "gap": gap, "faults": replay}
+    told = f"{found.seconds:.2g} s of flight; give a longer flight"
+    replay = always or found.incomplete or (told if found.seconds < FIRST_ESTIMATE else "")
+    identify = whole or found.incomplete or (told if found.seconds < SHORTEST_TO_IDENTIFY else "")
+    return {"replay": replay, "identify": identify, "gap": gap, "faults": replay}
 
 
 def _too_short(seconds: float) -> str:
@@ -88,6 +93,8 @@ def _refusal(path: Path, read: Callable[[], object]) -> str:
             return text
         except ModuleNotFoundError as error:  # as the command itself, which needs more packages than this one
             return f"needs the package {error.name}, which is not installed; run: pip install -r requirements/desk.txt"
+        except Exception as error:  # as the command itself, whose fault must not hide the rest of the table
+            return f"fails with {type(error).__name__}: {' '.join(str(error).split())}"
     return ""
 
 
@@ -99,15 +106,19 @@ def _replayed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame)
         spans: dict[str, tuple[float, float]] = {}
         names: tuple[str, ...] = ()
         force, lift = MeanForce(), MeanLift(aircraft)
+        times: list[float] = []
         for piece in flight.pieces:
             names, spans = piece.streams.actuators.names, joined_spans(spans, stamp_spans(piece.streams))
             alignment = alignment or PieceAlignment(aircraft, max_gap, carried_by(piece.streams, setting))
             aligned = alignment.take(piece.streams, last=piece.last)
+            times += [float(aligned.time[0]), float(aligned.time[-1])] if aligned.time.size else []
             force.add(aligned.time, aligned.samples[:, AZ])
             lift.add(aligned.time, *aligned.samples[:, LIFT].T)
         if force.count:
             force.check(flight.name)
             lift.check(flight.name)
+            if times[-1] - times[0] < FIRST_ESTIMATE:
+                raise InputError(too_short_to_replay(flight.name, times[-1] - times[0]))
             return
         Actuation.of(aircraft).require(names, flight.name)
         raise InputError(why_nothing_aligned(flight.name, spans, alignment.rejected if alignment else {}))
@@ -115,11 +126,17 @@ def _replayed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame)
 
 def _identified(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame) -> None:
     """Read a flight as ``sysid identify`` does. Flow angles need not be measured, as not all methods need them."""
+    from sysid_node.batch.regression.effective_length import effective_degrees_of_freedom  # noqa: PLC0415  # JAX
     from sysid_node.batch.regression.measured_coefficients import measured_coefficients  # noqa: PLC0415  # JAX
+    from sysid_node.batch.settings import DEFAULT_LOW_PASS  # noqa: PLC0415  # JAX
 
     record = load_flight_record(path, aircraft, topics=topics, frame=frame, carried="auto")
     unmeasured = {name: np.zeros(len(record)) for name in _ANGLES if not record.measured(name)}
-    measured_coefficients(aircraft, replace(record, columns={**record.columns, **unmeasured}))
+    found = measured_coefficients(aircraft, replace(record, columns={**record.columns, **unmeasured}))
+    for coefficient, regressors in aircraft.model_structure.items():
+        if coefficient in found.coefficients:
+            names = [f"{coefficient}_{name}" for name in regressors]
+            effective_degrees_of_freedom(names, [found.time], DEFAULT_LOW_PASS)
 
 
 def _diagnosed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame) -> None:

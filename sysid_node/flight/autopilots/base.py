@@ -79,6 +79,8 @@ class Adapter(ABC):
 
     topics: ClassVar[Mapping[str, str]]  # name -> message type
     aliases: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})  # other names in recordings
+    essential: ClassVar[tuple[str, str, str]]  # of the topics, those of IMU, airspeed and outputs
+    stand_ins: ClassVar[Mapping[str, str]] = MappingProxyType({})  # a topic that serves for one that is not recorded
     outputs: ClassVar[tuple[str, ...]]  # names of servo and motor outputs
     example: ClassVar[str]  # a value of the parameter joints
     package: ClassVar[str]  # that defines its messages

@@ -35,6 +35,7 @@ class Mavros(FiveTopics):
     """ArduPlane with MAVROS 2; from recordings also with MAVROS 1, whose topics and types have other names."""
 
     parts = IMU, ATTITUDE, PRESSURE, AIRSPEED, OUTPUTS
+    essential = IMU, AIRSPEED, OUTPUTS
     topics = MappingProxyType(
         {
             IMU: "sensor_msgs/msg/Imu",
@@ -47,6 +48,7 @@ class Mavros(FiveTopics):
     aliases = MappingProxyType(
         {PRESSURE: ("/mavros/imu/atm_pressure",), AIRSPEED: ("/mavros/nav_info/airspeed",)}  # MAVROS 0.x; its forks
     )
+    stand_ins = MappingProxyType({IMU: ATTITUDE})
     outputs = tuple(f"out{i}" for i in range(1, 33))
     example = "aileron=out1:1500:0.001 elevator=out2:1500:0.001 throttle=out3:1000:0.001 rudder=out4:1500:0.001"
     package = "mavros_msgs"

@@ -39,6 +39,7 @@ class Px4(Adapter):
             MOTORS: "px4_msgs/msg/ActuatorMotors",
         }
     )
+    essential = IMU, AIRSPEED, SERVOS
     outputs = (*(f"servo{i}" for i in range(1, 9)), *(f"motor{i}" for i in range(1, 13)))
     example = "aileron=servo1:0:0.44 elevator=servo2:0:0.44 rudder=servo3:0:0.44 throttle=motor1:0:1"
     package = "px4_msgs"

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from copy import deepcopy
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from rosbags.interfaces import Connection
-from rosbags.rosbag2 import Reader
-from rosbags.typesys import get_types_from_msg
-from rosbags.typesys.store import Typestore
+from rosbags.highlevel import AnyReader
 
 from sysid_node.errors import InputError
 from sysid_node.flight.autopilots.base import Adapter, AirSample, ImuSample, JointSample, Sample
-from sysid_node.flight.bag.message_types import type_store
-from sysid_node.flight.bag.storage_files import checked_files
+from sysid_node.flight.autopilots.recorded_topics import RecordedTopics, recorded_topics
+from sysid_node.flight.bag.recordings import open_recording, require_definitions
 from sysid_node.flight.frames import euler_from_quaternion
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import AirDataStream, Arrival, ImuStream, JointStream, Streams
@@ -37,49 +33,29 @@ def read_recorded(path: str | Path, adapter: Adapter) -> Streams:
     """
     path = Path(path)
     source = f"bag {path.name}"
-    try:
-        return streams_of_samples(_read(path, adapter, source), source)
-    except InputError:
-        raise
-    except Exception as error:  # parsers of a damaged file raise all kinds of exceptions
-        words = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{source}: cannot be read: {words}; give a rosbag2 folder, .mcap or .db3 file") from error
-
-
-def _read(path: Path, adapter: Adapter, source: str) -> list[LoggedSample]:
-    with checked_files(path) as files, Reader(files) as reader:
-        chosen = [connection for connection in reader.connections if connection.topic in adapter.topics]
-        if not chosen:
+    with open_recording(path) as reader:
+        chosen = recorded_topics(reader.connections, type(adapter), source)
+        if not chosen.connections:
             raise InputError(f"{source}: none of the autopilot's topics in it; expected {', '.join(adapter.topics)}")
-        return list(_samples(reader, chosen, _types(chosen, adapter, source), adapter))
+        logged = [sample for _, sample in heard_samples(reader, chosen, adapter, path.name)]
+    return streams_of_samples(logged, source)
 
 
-def _types(connections: list[Connection], adapter: Adapter, source: str) -> Typestore:
-    """The type store, with the definitions of the messages that the bag holds."""
-    store = deepcopy(type_store())
-    for connection in connections:
-        wanted = adapter.topics[connection.topic]
-        if connection.msgtype != wanted:
-            raise InputError(f"{source}: topic {connection.topic} is {connection.msgtype}, expected {wanted}")
-        if connection.msgtype in store.fielddefs:
-            continue
-        if not connection.msgdef.data:
-            raise InputError(
-                f"{source}: no definition of {connection.msgtype} in it; convert it to mcap where that is installed"
-            )
-        found = get_types_from_msg(connection.msgdef.data, connection.msgtype)
-        store.register({name: fields for name, fields in found.items() if name not in store.fielddefs})
-    return store
+def heard_samples(
+    reader: AnyReader, chosen: RecordedTopics, adapter: Adapter, bag: str
+) -> Iterator[tuple[str, LoggedSample]]:
+    """The samples that an adapter makes of a recording, with the adapter's names of their topics, in log order.
 
-
-def _samples(
-    reader: Reader, connections: list[Connection], store: Typestore, adapter: Adapter
-) -> Iterator[LoggedSample]:
+    Raises InputError, which names the ``bag``, where it lacks the definition of a message.
+    """
+    connections = [c for c in reader.connections if c.id in chosen.connections]
+    require_definitions(reader, connections, bag)
     for order, (connection, log_ns, data) in enumerate(reader.messages(connections)):
-        message: Any = store.deserialize_cdr(data, connection.msgtype)
-        sample = adapter.hear(connection.topic, message)
-        if sample is not None:
-            yield LoggedSample(order, log_ns, sample)
+        message: Any = reader.deserialize(data, connection.msgtype)
+        for ours in chosen.connections[connection.id]:
+            sample = adapter.hear(ours, message)
+            if sample is not None:
+                yield ours, LoggedSample(order, log_ns, sample)
 
 
 def streams_of_samples(logged: list[LoggedSample], name: str) -> Streams:

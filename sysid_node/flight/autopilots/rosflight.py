@@ -21,6 +21,7 @@ class Rosflight(FiveTopics):
     """ROSflight 2, whose firmware streams OutputRaw, Airspeed and Barometer."""
 
     parts = IMU, ATTITUDE, PRESSURE, AIRSPEED, OUTPUTS
+    essential = IMU, AIRSPEED, OUTPUTS
     topics = MappingProxyType(
         {
             IMU: "sensor_msgs/msg/Imu",

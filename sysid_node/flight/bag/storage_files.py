@@ -16,6 +16,7 @@ from sysid_node.errors import InputError
 CHUNK_LIMIT = 256 * 2**20
 
 _MAGIC, _CHUNK = b"\x89MCAP0\r\n", 0x06
+_SUFFIXES = {_MAGIC: ".mcap", b"SQLite format 3\x00": ".db3", b"#ROSBAG V2.0": ".bag"}
 _IN_URI = "%?#"  # rosbags opens a database by a URI, in which these do not stand for themselves
 
 
@@ -34,26 +35,38 @@ def checked_files(bag: Path) -> Iterator[Path]:
     """The path under which rosbags may read a bag. Raises InputError where its files would be misread.
 
     A database with messages in a journal beside it would be read without these. One whose path holds %, ? or # would
-    be taken for another file, so that it is read through a link. A chunk that unpacks to more than ``CHUNK_LIMIT`` is
-    refused by its declared size.
+    be taken for another file, so that it is read through a link. So is one whose name does not say what it holds. A
+    chunk that unpacks to more than ``CHUNK_LIMIT`` is refused by its declared size.
     """
     files = sorted(bag.glob("*.*")) if bag.is_dir() else [bag]
+    suffix = "" if bag.is_dir() else _suffix(bag)
     for file in files:
-        if file.suffix == ".db3":
+        if (suffix or file.suffix) == ".db3":
             _refuse_journal(file)
-        if file.suffix == ".mcap" and file.is_file():
+        if (suffix or file.suffix) == ".mcap" and file.is_file():
             _refuse_bombs(file)
-    databases = [file for file in files if file.suffix == ".db3"]
-    if not any(mark in str(file.absolute()) for file in databases for mark in _IN_URI):
+    databases = [file for file in files if (suffix or file.suffix) == ".db3"]
+    named_so = bag.suffix != ".bag" if bag.is_dir() else bag.suffix == suffix
+    if named_so and not any(mark in str(file.absolute()) for file in databases for mark in _IN_URI):
         yield bag
         return
     odd = [file.name for file in databases if any(mark in file.name for mark in _IN_URI)]
     if bag.is_dir() and odd:
         raise InputError(f"bag {bag.name}: {odd[0]} has one of {_IN_URI} in its name; rename it, and in metadata.yaml")
     with TemporaryDirectory(prefix="sysid-") as folder:
-        link = Path(folder, "bag.db3" if bag.is_file() else "bag")
+        link = Path(folder, f"bag{suffix}")
         link.symlink_to(bag.absolute())
         yield link
+
+
+def _suffix(file: Path) -> str:
+    """The suffix by which rosbags knows the content of a file; its own where the content is none of a bag."""
+    try:
+        with file.open("rb") as stream:
+            head = stream.read(16)
+    except OSError:  # a file that is missing, which the reader says
+        return file.suffix
+    return next((suffix for magic, suffix in _SUFFIXES.items() if head.startswith(magic)), file.suffix)
 
 
 @contextmanager

@@ -7,6 +7,7 @@ import numpy as np
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.flight.frames import euler_from_quaternion
 from sysid_node.flight.logs.autopilot_log import AutopilotLog, Signal
+from sysid_node.flight.logs.flown import Mask
 from sysid_node.flight.logs.rates import rate_of, rate_text
 from sysid_node.flight.record import Array
 from sysid_node.flight.streams import Stamps
@@ -14,7 +15,7 @@ from sysid_node.flight.streams import Stamps
 #: Attitudes and airspeeds further apart than this are not connected, s.
 LONGEST_BRIDGE = 1.0
 
-#: The angle of attack's constants are fitted to more samples of the airspeed than this.
+#: The angle of attack's constants are fitted to as many changes of the airspeed, or more.
 _FEWEST_TO_FIT = 30
 
 #: An airspeed that is sampled less often than this (Hz) is completed between its samples.
@@ -29,7 +30,7 @@ def airspeed_between_samples(time: Array, force: Array, euler: Array, sampled_at
     cos(phi)``. Lift is proportional to the load factor n = -az / g, so that alpha = a0 + a1 n. The least-squares fit
     of a0, a1 and a constant error of the accelerometer to the airspeed's own samples gives the change between these;
     what is left over is added on a line, so that the result passes through every sample. Where the attitude is NaN,
-    the change is zero.
+    the change is zero. Changes over a pause of the samples or of the IMU are not fitted.
     """
     normal = force[:, 2] + GRAVITY * np.cos(euler[:, 1]) * np.cos(euler[:, 0])
     along = force[:, 0] - GRAVITY * np.sin(euler[:, 1])
@@ -38,12 +39,22 @@ def airspeed_between_samples(time: Array, force: Array, euler: Array, sampled_at
     gained = np.vstack([np.zeros(4), np.cumsum(steps, axis=0)])
     at_samples = np.column_stack([np.interp(sampled_at, time, column) for column in gained.T])
     weights = np.array([1.0, 0.0, 0.0, 0.0])
-    if sampled_at.size > _FEWEST_TO_FIT:
-        changes = np.diff(at_samples, axis=0)
-        weights[1:] = np.linalg.lstsq(changes[:, 1:], np.diff(airspeed) - changes[:, 0], rcond=None)[0]
+    fitted = _without_pause(time, sampled_at)
+    if np.count_nonzero(fitted) >= _FEWEST_TO_FIT:
+        changes = np.diff(at_samples, axis=0)[fitted]
+        weights[1:] = np.linalg.lstsq(changes[:, 1:], np.diff(airspeed)[fitted] - changes[:, 0], rcond=None)[0]
     left_over = airspeed - at_samples @ weights
     completed: Array = gained @ weights + np.interp(time, sampled_at, left_over)
     return completed
+
+
+def _without_pause(time: Array, sampled_at: Array) -> Mask:
+    """Which of the M - 1 steps between samples (s) are no pause and hold none of the IMU, whose times are ``time``."""
+    steps = np.diff(sampled_at)
+    pauses = np.flatnonzero(np.diff(time) > LONGEST_BRIDGE)
+    begun = np.searchsorted(time[pauses], sampled_at[1:]) - np.searchsorted(time[pauses + 1], sampled_at[:-1], "right")
+    usable: Mask = (steps <= max(LONGEST_BRIDGE, 1.5 * float(np.median(steps)))) & (begun <= 0)
+    return usable
 
 
 def attitude_at(attitude: Signal, at_ns: Stamps) -> Array:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -60,3 +60,31 @@ class AutopilotLog:
     flown: Spans | None = None  # in the air as a fixed wing; None: the log does not say
     remarks: tuple[str, ...] = ()
     remedies: Mapping[str, str] = field(default_factory=dict)  # role -> the setting that raises its rate
+    lacks: Mapping[str, str] = field(default_factory=dict)  # role -> why it has no usable samples, and what to do
+    banks: tuple[LoggedCommands, ...] = ()  # of which the outputs are made, each at its own times
+    unmapped: str = ""  # why the log does not tell which output moves which surface
+
+
+def joined(banks: Sequence[LoggedCommands], base: Signal) -> LoggedCommands:
+    """All outputs of some banks at the times of one of them; of the others, their last sample before."""
+    names: list[str] = []
+    columns: list[Array] = []
+    for bank in banks:
+        place = np.searchsorted(bank.signal.stamp_ns, base.stamp_ns, side="right") - 1
+        names += bank.names
+        columns += list(bank.signal.values[np.clip(place, 0, len(bank.signal) - 1)].T)
+    values = np.column_stack(columns) if columns else np.empty((0, 0))
+    return LoggedCommands(tuple(names), Signal(base.source, base.stamp_ns, values))
+
+
+def with_outputs_of(log: AutopilotLog, outputs: str) -> AutopilotLog:
+    """The log, whose outputs are at the times of the bank that moves most of the joints.
+
+    ``outputs``: which output moves which joint, as in the aircraft file.
+    """
+    moved = [word.partition("=")[2].partition(":")[0] for word in outputs.split()]
+    counts = [sum(name in bank.names for name in moved) for bank in log.banks]
+    if max(counts, default=0) == 0:
+        return log
+    base = log.banks[counts.index(max(counts))].signal
+    return replace(log, outputs=joined(log.banks, base))

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Mapping
 from enum import Enum
 from pathlib import Path
 
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
+from sysid_node.flight.frames import BodyFrame
+from sysid_node.flight.topics import topic_names
 
 
 class Content(Enum):
@@ -61,6 +65,29 @@ def content_of(path: str | Path) -> Content:
         what = "is empty" if not head else "is no flight that can be read"
         raise InputError(f"{path}: {what}; expected a bag (ROS 1 or 2), .ulg, .bin, .tlog or CSV")
     return found
+
+
+def remapped(path: str | Path, topics: Mapping[str, str] | None) -> bool:
+    """Whether the input topics (as of ``topic_names``) have other names than usual.
+
+    Raises InputError where they have and the path holds no bag, or one of ROS 1.
+    """
+    if topics is None or dict(topics) == topic_names():
+        return False
+    content = content_of(path)
+    if content is not Content.ROSBAG2:
+        raise InputError(f"--topic is for bags of ROS 2; {path} is a {content.value}; leave it out")
+    return True
+
+
+def say_that_axes_are_known(path: str | Path, frame: BodyFrame, what: str) -> None:
+    """Warn (InputWarning) where other axes than usual were asked for, but the file, a ``what``, has its own."""
+    if frame != "flu":
+        warnings.warn(
+            f"--body-frame is for bags of our own topics; {path} is a {what}, whose axes are known: it changes nothing",
+            InputWarning,
+            stacklevel=3,
+        )
 
 
 def _is_text(head: bytes) -> bool:

@@ -7,21 +7,24 @@ from dataclasses import replace
 from pathlib import Path
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.flight.actuation import joint_names
 from sysid_node.flight.align import flight_record
 from sysid_node.flight.autopilots.base import AdapterSettings
+from sysid_node.flight.autopilots.joints import require_known
+from sysid_node.flight.autopilots.recorded_topics import autopilot_of
 from sysid_node.flight.bag.reader import open_bag, read_streams, reading
 from sysid_node.flight.commands import JointMessage, read_commands
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.live.mean_force import checked_force
 from sysid_node.flight.live.mean_lift import checked_lift
-from sysid_node.flight.logs.autopilot_log import AutopilotLog
+from sysid_node.flight.logs.autopilot_log import AutopilotLog, with_outputs_of
 from sysid_node.flight.logs.checks.refusals import refusal_of_log, refusal_of_streams, require
-from sysid_node.flight.logs.content import Content, content_of
+from sysid_node.flight.logs.content import Content, content_of, remapped, say_that_axes_are_known
 from sysid_node.flight.logs.damage import reading_log
 from sysid_node.flight.logs.fractions import between_commands, joints_of_fractions
 from sysid_node.flight.logs.log_streams import LogFlight, flight_of_log
-from sysid_node.flight.logs.readers.autopilot_bag import autopilot_of, read_autopilot_bag
+from sysid_node.flight.logs.readers.autopilot_bag import read_autopilot_bag
 from sysid_node.flight.logs.readers.dataflash import read_dataflash
 from sysid_node.flight.logs.readers.telemetry import read_telemetry
 from sysid_node.flight.logs.readers.ulog import read_ulog
@@ -29,7 +32,6 @@ from sysid_node.flight.logs.record_streams import streams_from_record
 from sysid_node.flight.logs.tables import with_commands
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.streams import COMMAND_FRACTIONS, COMMANDS, Streams, in_order_of_logging
-from sysid_node.flight.topics import topic_names
 
 
 def read_autopilot_log(path: str | Path, settings: AdapterSettings | None = None) -> AutopilotLog | None:
@@ -59,10 +61,15 @@ def is_autopilot_bag(path: Path) -> bool:
     return "sysid_msgs/msg/AirData" not in topics.values() and autopilot_of(topics) is not None
 
 
-def open_log(path: str | Path, settings: AdapterSettings | None = None, outputs: str = "") -> LogFlight | None:
-    """The flight in an autopilot's log, before its commands become joints; None for other bags and tables."""
+def open_log(
+    path: str | Path, settings: AdapterSettings | None = None, outputs: str = "", key: str = "outputs"
+) -> LogFlight | None:
+    """The flight in an autopilot's log, before its commands become joints; None for other bags and tables.
+
+    ``outputs`` and the ``key`` that states them as of ``flight_of_log``.
+    """
     log = read_autopilot_log(path, settings)
-    return None if log is None else flight_of_log(log, outputs)
+    return None if log is None else flight_of_log(log, outputs, key)
 
 
 def open_streams(
@@ -73,12 +80,16 @@ def open_streams(
     ``topics`` and ``frame`` are for bags of our own topics. Raises InputError where the flight cannot be read, lacks
     a signal, or was logged at too low a rate.
     """
-    remapped = topics is not None and dict(topics) != topic_names()
-    log = None if remapped else read_autopilot_log(path)
+    other_topics = remapped(path, topics)
+    log = None if other_topics else read_autopilot_log(path)
     if log is not None:
+        say_that_axes_are_known(path, frame, f"log of {log.autopilot}")
+        log = with_outputs_of(log, aircraft.outputs)
         require(log.name, refusal_of_log(log, raw_outputs=bool(aircraft.outputs)))
-        streams = flight_of_log(log, aircraft.outputs).streams
-    elif not remapped and content_of(path) is Content.TABLE:
+        key = f"aircraft {aircraft.name}: outputs"
+        require_known(aircraft.outputs, joint_names(aircraft), f"aircraft {aircraft.name}", key)
+        streams = flight_of_log(log, aircraft.outputs, key).streams
+    elif is_table(path, topics, frame):
         return streams_from_record(read_csv(path), aircraft)
     else:
         streams = read_streams(path, topics, frame)
@@ -108,16 +119,22 @@ def load_flight_record(
 
     ``carried``: what the actuators' messages, or a table's columns, are ("commands", "positions", or "auto").
     """
-    if is_table(path):
+    if is_table(path, topics, frame):
         return with_commands(aircraft, checked_lift(aircraft, checked_force(read_csv(path))), carried)
     streams = open_streams(path, aircraft, topics, frame)
     record = flight_record(aircraft, streams, max_gap, carried_by(streams, carried))
     return checked_lift(aircraft, checked_force(record))
 
 
-def is_table(path: str | Path) -> bool:
-    """Whether a flight is a table, whose samples are aligned already. Raises InputError where it is no flight."""
-    return content_of(path) is Content.TABLE
+def is_table(path: str | Path, topics: Mapping[str, str] | None = None, frame: BodyFrame = "flu") -> bool:
+    """Whether a flight is a table, whose samples are aligned already. Raises InputError where it is no flight.
+
+    ``topics`` and ``frame`` are for bags of our own topics: raises InputError, or warns, where a table is given them.
+    """
+    if remapped(path, topics) or content_of(path) is not Content.TABLE:
+        return False
+    say_that_axes_are_known(path, frame, Content.TABLE.value)
+    return True
 
 
 def recorded_commands(path: str | Path) -> list[JointMessage]:

@@ -12,10 +12,8 @@ import struct
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rosbags.highlevel import AnyReader
-
-from sysid_node.flight.bag.message_types import type_store
 from sysid_node.flight.bag.reader import open_bag
+from sysid_node.flight.bag.recordings import open_recording
 from sysid_node.flight.logs.content import Content, content_of
 from sysid_node.flight.logs.damage import reading_log
 from sysid_node.flight.logs.readers.packages import quietly, required
@@ -43,7 +41,7 @@ def log_origin(path: str | Path) -> LogOrigin:
             return LogOrigin(_utc(reader.start_time / 1e9), "")
     with reading_log(path):
         if content is Content.ROSBAG1:
-            with AnyReader([path], default_typestore=type_store()) as reader:
+            with open_recording(path) as reader:
                 return LogOrigin(_utc(reader.start_time / 1e9), "")
         if content is Content.ULOG:
             return _of_ulog(path)

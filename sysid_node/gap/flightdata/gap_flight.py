@@ -73,7 +73,7 @@ def load_gap_flight(
 
     Raises InputError where it is unreadable, lacks a signal or is too short.
     """
-    if is_table(path):
+    if is_table(path, topics, frame):
         record = checked_force(read_csv(path))
         rate = 1.0 / float(np.median(np.diff(record.time)))
         return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))

@@ -32,6 +32,23 @@ def test_a_wide_window_smooths():
     assert differentiate(TIME, x, half_width=8, degree=2).std() < 0.1 * differentiate(TIME, x).std()
 
 
+@pytest.mark.parametrize("gap", [0.3, 30.0, 3.6e3, 1.0e9])
+def test_no_slope_is_taken_across_an_interruption(gap):
+    """Truth: each side's own derivative. A window across a long gap has a singular matrix."""
+    x = np.random.default_rng(5).normal(size=500)
+    time = np.where(np.arange(500) < 200, TIME, TIME + gap)
+    found = differentiate(time, x)
+    np.testing.assert_array_equal(found[:200], differentiate(time[:200], x[:200]))
+    np.testing.assert_array_equal(found[200:], differentiate(time[200:], x[200:]))
+
+
+def test_short_pieces_are_differentiated_as_far_as_they_go():
+    """Truth: straight lines of slopes 2 and 3; a sample alone has no slope."""
+    time = np.concatenate([TIME[:50], [10.0], 20.0 + TIME[:2], 30.0 + TIME[:3]])
+    found = differentiate(time, np.where(time < 25.0, 2.0 * time, 3.0 * time))
+    np.testing.assert_allclose(found, np.repeat([2.0, np.nan, 2.0, 3.0], [50, 1, 2, 3]), rtol=1e-9)
+
+
 def test_lowpass_keeps_the_band_undelayed_and_drops_the_rest():
     slow, fast = np.sin(2 * np.pi * 0.8 * TIME), np.sin(2 * np.pi * 20.0 * TIME)
     found = lowpass(TIME, (slow + fast)[:, None], 5.0)[:, 0]

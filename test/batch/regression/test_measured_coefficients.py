@@ -43,6 +43,21 @@ def test_the_ground_is_left_out_and_a_record_of_nothing_else_refused():
         measured_coefficients(KESTREL, FlightRecord(record.time, {**record.columns, "V": 0.0 * record["V"]}, "parked"))
 
 
+def test_a_sample_alone_in_a_gap_is_left_out():
+    """It has no angular acceleration; truth for the others: the flight without it."""
+    record = clean()
+    lone = (record.time < 3.0) | (record.time > 5.0)
+    there = lone | (np.arange(len(record)) == np.searchsorted(record.time, 4.0))
+
+    def kept(samples: np.ndarray) -> FlightRecord:
+        columns = {name: np.where(samples, values, np.nan) for name, values in record.columns.items()}
+        return FlightRecord(record.time, columns, "gap")
+
+    found, truth = measured_coefficients(KESTREL, kept(there)), measured_coefficients(KESTREL, kept(lone))
+    assert found.left_out == truth.left_out > 150
+    np.testing.assert_array_equal(found.coefficients["Cm"], truth.coefficients["Cm"])
+
+
 def test_what_tables_add_is_subtracted_and_the_polar_has_the_whole_lift():
     """By NumPy's interpolation; a table of a coefficient that has no derivatives is not needed."""
     tables = (

@@ -52,6 +52,26 @@ def test_the_others_are_shown_before_what_cannot_be_read_is_refused(tmp_path, ca
     assert err.count("\n") == 1
 
 
+def test_a_log_without_an_imu_is_shown(tmp_path, capsys):
+    """Truth: the message that it lacks."""
+    px4_log(tmp_path / "flight.ulg", drop=("sensor_combined",))
+    assert main(["check", str(tmp_path / "flight.ulg")]) == 0
+    assert "replay, identify, gap, faults: no: no sensor_combined in it; SDLOG_PROFILE" in capsys.readouterr().out
+
+
+def test_an_unexpected_fault_does_not_hide_the_other_files(tmp_path, capsys):
+    """No file has a name with a byte of zero, which Python refuses with a ValueError of its own."""
+    px4_log(tmp_path / "good.ulg")
+    (tmp_path / "empty.ulg").write_bytes(b"")
+    files = [str(tmp_path / name) for name in ("odd\0.ulg", "good.ulg", "empty.ulg")]
+    assert main(["check", *files]) == 2
+    out, err = capsys.readouterr()
+    assert "good.ulg: PX4 1.14.0, 20.0 s" in out
+    assert "odd" in err
+    assert "empty.ulg: is empty" in err
+    assert err.count("\n") == 1
+
+
 def thinned(rate: float, seconds: float) -> FlightRecord:
     """The flight as a table holds it, at a rate (Hz)."""
     whole = flight().between(2.0, 2.0 + seconds)
@@ -102,6 +122,8 @@ FLIGHTS = {
     "a table": (table, True, ("replay", "identify", "gap")),
     "a table at 10 Hz": (lambda folder: table(folder, rate=10.0), True, ("replay", "identify", "gap")),
     "a short table": (lambda folder: table(folder, seconds=3.0), True, ("replay", "identify")),
+    "a very short table": (lambda folder: table(folder, rate=200.0, seconds=0.9), True, ()),
+    "a table of a second": (lambda folder: table(folder, rate=200.0, seconds=1.2), True, ("replay", "identify")),
     "a longitudinal table": (lambda folder: lacking(folder, "ay", "p", "r", "beta", "da", "dr"), True, ("gap",)),
     "a table without rudder": (lambda folder: lacking(folder, "dr"), True, ()),
     "a table without density": (lambda folder: lacking(folder, "rho"), True, ("replay", "identify")),

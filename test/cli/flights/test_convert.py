@@ -1,16 +1,23 @@
 """``sysid convert``: a log becomes a bag that reads back as the same flight."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
+from mavros_bag import OUTPUTS, mavros_bag
+from simulated_logs import aircraft as simulated
+from simulated_logs import dataflash_log, px4_log
 
+from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.csv import read_csv, write_csv
 from sysid_node.flight.logs.opening import load_flight_record
 from sysid_node.flight.record import FlightRecord
+
+BAG = Path(__file__).resolve().parents[3] / "bags" / "cdrw_multistep"
 
 
 @pytest.fixture
@@ -71,3 +78,84 @@ def test_an_existing_bag_is_kept(log, tmp_path, capsys):
     assert main(arguments) == 2
     assert "exists already" in capsys.readouterr().err
     assert sorted((p.name, p.read_bytes()) for p in (tmp_path / "bag").iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "said"),
+    [
+        ("csv", ["--joints", OUTPUTS], "--joints is for a log or a bag of an autopilot; FILE is a CSV table; leave it"),
+        ("csv", ["--autopilot", "px4"], "--autopilot is for a bag of an autopilot's topics; FILE is a CSV table"),
+        ("ulg", ["--autopilot", "px4"], "--autopilot is for a bag of an autopilot's topics; FILE is a PX4 ULog"),
+        ("ulg", ["--air-temperature", "15"], "--air-temperature is for a bag of an autopilot's topics; FILE is a PX4"),
+        ("csv", ["--air-data-delay", "0"], "--air-data-delay is for a bag of an autopilot's topics; FILE is a CSV"),
+        (
+            "own",
+            ["--joints", OUTPUTS],
+            "--joints is for a log or a bag of an autopilot; FILE is a bag of our own topics",
+        ),
+        (
+            "own",
+            ["--air-data-delay", "0.1"],
+            "--air-data-delay is for a bag of an autopilot's topics; FILE is a bag of",
+        ),
+        ("mavros", ["--joints", OUTPUTS, "--topic", "imu/data:=/mavros/imu/data"], "--joints is for a log or a bag of"),
+        ("ulg", ["--topic", "imu/data:=/imu"], "--topic is for bags of ROS 2; FILE is a PX4 ULog; leave it out"),
+        ("csv", ["--topic", "imu/data:=/imu"], "--topic is for bags of ROS 2; FILE is a CSV table; leave it out"),
+        ("mavros", ["--joints", "a=out99:0:1"], "--joints: 'a=out99:0:1': no output 'out99'; expected out1 to out32"),
+        (
+            "mavros",
+            ["--aircraft", "cdrw", "--joints", "elevater=out2:1500:0.001"],
+            "--joints: 'elevater=out2:1500:0.001': aircraft cdrw has no joint 'elevater'; did you mean 'elevator'?",
+        ),
+    ],
+)
+def test_options_that_cannot_act_are_refused(log, tmp_path, capsys, kind, options, said):
+    make = {
+        "csv": lambda: log,
+        "own": lambda: BAG,
+        "ulg": lambda: tmp_path / "log.ulg",
+        "mavros": lambda: tmp_path / "m",
+    }
+    path = make[kind]()
+    if kind == "ulg":
+        px4_log(path)
+    elif kind == "mavros":
+        mavros_bag(path, seconds=2.0)
+    assert main(["convert", str(path), "--out", str(tmp_path / "bag"), *options]) == 2
+    assert said.replace("FILE", str(path)) in capsys.readouterr().err
+    assert not (tmp_path / "bag").exists()
+
+
+@pytest.mark.parametrize("command", ["check", "replay", "identify", "gap"])
+def test_every_command_refuses_topics_of_a_log(log, tmp_path, capsys, command):
+    options = [] if command == "check" else ["--aircraft", "cdrw", "--out", str(tmp_path / "out"), "--quiet"]
+    options += ["--method", "equation_error"] if command == "identify" else []
+    dataflash_log(tmp_path / "flight.bin")
+    for path, what in ((log, "CSV table"), (tmp_path / "flight.bin", "ArduPilot DataFlash log")):
+        assert main([command, str(path), *options, "--topic", "imu/data:=/my/imu"]) == 2
+        assert f"--topic is for bags of ROS 2; {path} is a {what}; leave it out" in capsys.readouterr().err
+
+
+def test_axes_of_a_log_are_known(log, tmp_path, capsys):
+    for command in (["check"], ["replay", "--aircraft", "cdrw", "--out", str(tmp_path / "out"), "--quiet"]):
+        main([command[0], str(log), *command[1:], "--body-frame", "frd"])
+        said = f"warning: --body-frame is for bags of our own topics; {log} is a CSV table, whose axes are known"
+        assert capsys.readouterr().err.count(said) == 1
+
+
+@pytest.mark.parametrize(
+    ("outputs", "said"),
+    [
+        ("elevator=out2:1500", "aircraft cdrw: outputs: 'elevator=out2:1500' is not NAME=OUTPUT:TRIM:SCALE"),
+        ("elevator=servo2:0:0.4", "aircraft cdrw: outputs: 'elevator=servo2:0:0.4': no output 'servo2'; expected out1"),
+        ("elevater=out2:0:0.4", "aircraft cdrw: outputs: 'elevater=out2:0:0.4': aircraft cdrw has no joint 'elevater'"),
+    ],
+)
+@pytest.mark.parametrize("command", ["convert", "replay"])
+def test_wrong_outputs_are_named_by_their_key(tmp_path, capsys, command, outputs, said):
+    dataflash_log(tmp_path / "flight.bin")
+    text = dump_aircraft(dataclasses.replace(simulated(), outputs=outputs))
+    (tmp_path / "aircraft.yaml").write_text(text, encoding="utf-8")
+    options = ["--aircraft", str(tmp_path / "aircraft.yaml"), "--out", str(tmp_path / "out"), "--quiet"]
+    assert main([command, str(tmp_path / "flight.bin"), *options]) == 2
+    assert said in capsys.readouterr().err

@@ -86,13 +86,19 @@ def px4_log(
     vanes: Mapping[str, tuple[float, float]] | None = None,
     aloft: tuple[float, float] | None = None,
     pulses: str = "",
+    blocked: tuple[float, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    slow_outputs: float = 0.0,
 ) -> FlightRecord:
     """A ULog of the flight, of PX4 1.11 where ``old``; without ``drop``, its clock ``jump`` s ahead from midway.
 
     ``torque``: rate of the torque setpoint, Hz, from which PX4 computes the servos linearly. ``start`` is the date that
     its GPS receiver states, and ``vehicle`` the autopilot's number. ``vanes`` are "aoa" and "slip" with the time (s)
     between which each is out of its range, and ``aloft`` those between which the aircraft flies.
-    ``pulses``: the bank, MAIN or AUX, whose pulses are logged in place of the servos' commands.
+    ``pulses``: the bank, MAIN or AUX, whose pulses are logged in place of the servos' commands. ``blocked``: the times
+    (s) between which the airspeed sensor, logged at 50 Hz too, is blocked and not used by PX4.
+    ``parameters`` replace those that the log would hold. ``slow_outputs``: a rate, Hz, at which the pulses of outputs
+    that stand still are logged, too.
     """
     record = flight()
     us = microseconds(record)
@@ -104,10 +110,17 @@ def px4_log(
         *_px4_controls(us[at["controls"]], fractions(record)[at["controls"]], old=old, elevons=elevons),
         *(_vane(record, at["airspeed"], name, span) for name, span in (vanes or {}).items()),
     ]
-    parameters = {} if old else _px4_parameters(elevons=elevons)
+    stated = {} if old else _px4_parameters(elevons=elevons)
+    if blocked is not None:
+        topics = [topic for topic in topics if topic.name != "airspeed_validated"]
+        topics += _blocked_sensor(record, at["airspeed"], blocked)
+    if slow_outputs:
+        still = picked(record, slow_outputs)
+        pulses_held = {"output[16]": ("float", np.full((still.size, 16), 1500.0))}
+        topics.append(Topic("actuator_outputs", us[still], pulses_held))
     if pulses:
-        topics, stated = _as_pulses(topics, pulses)
-        parameters |= stated
+        topics, of_pulses = _as_pulses(topics, pulses)
+        stated |= of_pulses
     if aloft is not None:
         times = us[0] + np.round(np.array([0.0, *aloft]) * 1e6).astype(np.int64)
         landed = {"landed": ("bool", np.array([True, False, True]))}
@@ -123,7 +136,7 @@ def px4_log(
     kept = [topic for topic in topics if topic.name not in drop]
     release = 0x010B0200 if old else 0x010E0000
     jumping = (lambda time: time + (round(jump * 1e6) if time > middle else 0)) if jump else None
-    write_ulog(path, kept, parameters, release, jumping, vehicle)
+    write_ulog(path, kept, stated | dict(parameters or {}), release, jumping, vehicle)
     return record
 
 
@@ -192,6 +205,23 @@ def _vane(record: FlightRecord, at: np.ndarray, name: str, span: tuple[float, fl
     return Topic(f"airflow_{name}", microseconds(record)[at], fields)
 
 
+def _blocked_sensor(record: FlightRecord, at: np.ndarray, span: tuple[float, float]) -> list[Topic]:
+    """The validated airspeed, and the sensor's, 10 % lower and 7 m/s in the time between the two of the span (s)."""
+
+    def out(places: np.ndarray) -> np.ndarray:
+        since = record.time[places] - record.time[0]
+        return (since >= span[0]) & (since < span[1])
+
+    fine = picked(record, 50.0)
+    raw = np.where(out(fine), 7.0, record["V"][fine] / 1.1)
+    return [
+        Topic("airspeed_validated", microseconds(record)[at], {
+            "true_airspeed_m_s": ("float", record["V"][at]), "airspeed_source": ("int8_t", np.where(out(at), 0, 1)),
+        }),
+        Topic("airspeed", microseconds(record)[fine], {"true_airspeed_m_s": ("float", raw)}),
+    ]  # fmt: skip
+
+
 def _px4_controls(us: np.ndarray, commands: np.ndarray, *, old: bool, elevons: bool) -> list[Topic]:
     roll, pitch, yaw, thrust = commands.T
     if old:
@@ -232,11 +262,13 @@ def dataflash_log(
     drop: tuple[str, ...] = (),
     jump: float = 0.0,
     states: Mapping[str, list[tuple[float, int]]] | None = None,
+    more: Mapping[str, float] | None = None,
 ) -> FlightRecord:
     """A DataFlash log of the flight, with a second IMU that is wrong and not the primary.
 
     ``text`` writes it as text; ``drop`` leaves kinds of messages out, and from midway its clock is ``jump`` s ahead.
     ``states`` are those of "STAT" (isFlying) and "MODE" (its number) from some times on, s.
+    ``more`` are other parameters.
     ``layout`` is one of ``LAYOUTS``, and ``mixing`` the parameters MIXING_*, of which a log without them has none.
     ``start`` is the GPS receiver's time at the first message and ``board`` the line with the board's number.
     """
@@ -247,7 +279,7 @@ def dataflash_log(
     degrees = np.degrees(np.column_stack([record[name] for name in ("phi", "theta", "psi")]))
     equivalent = record["V"] * np.sqrt(record["rho"] / 1.225)
     pulses = pulses_of(fractions(record), layout, mixing or {})
-    parameters = {**_ardupilot_parameters(layout), **(mixing or {})}
+    parameters = {**_ardupilot_parameters(layout), **(mixing or {}), **(more or {})}
     kelvin = 288.15
     rows = {
         "MSG": [(us[0], f"{firmware} (abcd)"), *([(us[0], board)] if board else [])],

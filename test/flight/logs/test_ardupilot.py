@@ -47,7 +47,13 @@ def test_the_primary_imu_and_the_estimated_angle_of_attack_are_said(tmp_path):
         ({"flying": 0}, "never flew as a fixed wing"),
         ({"states": {"MODE": [(0.0, 18)]}}, "never flew as a fixed wing"),
         ({"drop": ("ARSP",)}, "no ARSP in it; connect an airspeed sensor, and log it"),
+        ({"drop": ("BARO",)}, "no BARO in it, by whose density ARSP becomes the true airspeed; LOG_BITMASK: set bit 7"),
         ({"drop": ("IMU",)}, "no IMU in it; LOG_BITMASK: set bit 7"),
+        ({"drop": ("RCOU",)}, r"bin: no RCOU in it; LOG_BITMASK: set bit 13 \(RC\)[^(]*$"),
+        (
+            {"rates": {**FULL_RATES, "controls": 10.0, "imu": 10.0}, "more": {"LOG_BITMASK": 65535}},
+            r"LOG_BITMASK has bits 0 and 7 set; raise SCHED_LOOP_RATE.*LOG_BITMASK has bit 13 \(RC\) set, which",
+        ),
         ({"drop": ("PARM",)}, "which output moves which surface is not known .the log holds no parameters SERVOn"),
         (
             {"rates": {**FULL_RATES, "controls": 10.0}},

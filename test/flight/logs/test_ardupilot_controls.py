@@ -50,6 +50,17 @@ def test_a_surface_moves_no_further_than_its_travel(layout):
     np.testing.assert_allclose(controls.signal.values[6, 1], -0.6, atol=4e-3)
 
 
+def test_reverse_thrust_is_on_the_other_side_of_the_trim():
+    """ArduPlane's ``set_control_channels``: with THR_MIN below 0 the throttle's output is an angle about its trim."""
+    parameters = {"SERVO1_FUNCTION": 19, "SERVO2_FUNCTION": 70, "SERVO2_MIN": 1000, "SERVO2_MAX": 2000, "THR_MIN": -100}
+    pulses = np.array([[1500.0, 1000.0], [1500.0, 1500.0], [1500.0, 2000.0]])
+    outputs = LoggedCommands(("out1", "out2"), Signal("RCOU", np.arange(3), pulses))
+    controls, _ = control_commands(outputs, parameters | {"SERVO2_TRIM": 1500})
+    np.testing.assert_allclose(controls.signal.values[:, 1], [-1.0, 0.0, 1.0])
+    controls, _ = control_commands(outputs, parameters | {"THR_MIN": 0})
+    np.testing.assert_allclose(controls.signal.values[:, 1], [0.0, 0.5, 1.0])
+
+
 def test_a_gain_of_zero_is_said():
     controls, remarks = read("elevons", {"MIXING_GAIN": 0.0}, STICKS)
     assert controls.names == ("rudder", "throttle")

@@ -126,3 +126,29 @@ def test_impossible_values_are_left_out(value):
 def test_too_short_a_flight_tells_nothing(count):
     signals = tuple(signal.selected(np.arange(len(signal)) < count) for signal in rolled(9))
     assert judged(signals)["roll"].word == "hardly"
+
+
+@pytest.mark.parametrize("pause", [60.0, 1.0e9])
+def test_a_pause_does_not_count(pause):
+    """Truth: the flight without it. A clock that was set ahead by years must not ask for as many steps."""
+    imu, inputs = rolled(3)
+    whole = judged((imu, inputs))["roll"]
+    later = np.where(imu.stamp_ns > imu.stamp_ns[0] + 15_000_000_000, round(pause * 1e9), 0)
+    moved = [Signal(one.source, one.stamp_ns + later, one.values) for one in (imu, inputs)]
+    found = judged(moved)["roll"]
+    assert found.response == pytest.approx(whole.response, rel=0.05)
+    assert found.error == pytest.approx(whole.error, rel=0.1)
+
+
+def test_a_pause_of_one_signal_is_one_of_both():
+    """Truth: the flight whose signals pause together; the inputs are logged on, for an hour."""
+    imu, inputs = rolled(3)
+    hour = 3_600_000_000_000
+    later = np.where(imu.stamp_ns > imu.stamp_ns[0] + 15_000_000_000, hour, 0)
+    moved = [Signal(one.source, one.stamp_ns + later, one.values) for one in (imu, inputs)]
+    between = imu.stamp_ns[0] + np.arange(15_100_000_000, hour, 100_000_000)
+    stamps = np.concatenate([moved[1].stamp_ns, between])
+    order = np.argsort(stamps)
+    values = np.concatenate([moved[1].values, np.zeros((between.size, 1))])
+    logged_on = Signal("servos", stamps[order], values[order])
+    assert judged((moved[0], logged_on))["roll"].error == pytest.approx(judged(moved)["roll"].error, rel=0.05)

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from simulated_logs import FULL_RATES, PX4_DEFAULT, aircraft, px4_log
+from simulated_logs import FULL, FULL_RATES, PX4_DEFAULT, aircraft, px4_log
 
 from sysid_node.errors import InputError
 from sysid_node.flight.align import flight_record
+from sysid_node.flight.logs.checks.survey import survey
 from sysid_node.flight.logs.opening import load_flight_record, open_log, open_streams, read_autopilot_log
 from sysid_node.flight.streams import COMMANDS
 
@@ -121,13 +122,37 @@ def test_slow_airspeed_moves_as_the_imu_says(tmp_path):
     assert any("airspeed_validated comes at 2 Hz" in remark for remark in remarks)
 
 
+def test_a_sensor_that_px4_does_not_use_is_not_used(tmp_path):
+    """Truth: the record's airspeed. The sensor is blocked from 8 to 12 s (airspeed_source 0, AirspeedValidated.msg)."""
+    record = px4_log(tmp_path / "flight.ulg", {**FULL_RATES, "airspeed": 5.0}, blocked=(8.0, 12.0))
+    air = open_streams(tmp_path / "flight.ulg", aircraft()).air_data
+    since = (air.arrival.stamp_ns - air.arrival.stamp_ns[0]) / 1e9
+    assert not np.any((since > 8.2) & (since < 11.99))
+    at = np.searchsorted(record.time - record.time[0], since + 1e-4) - 1
+    used = (since < 7.99) | (since > 12.2)
+    np.testing.assert_allclose(air.values[used, 0], record["V"][at][used], rtol=0.02)
+    assert used.sum() > 750
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        (
+            {"rates": {**FULL_RATES, "airspeed": 5.0}, "blocked": (0.0, 99.0)},
+            "airspeed_validated never comes from a sensor; connect an airspeed sensor",
+        ),
         ({"vehicle_type": 1}, "never flew as a fixed wing"),
         ({"drop": ("airspeed_validated",)}, "no airspeed in it; connect an airspeed sensor"),
         ({"drop": ("sensor_combined",)}, "no sensor_combined in it; SDLOG_PROFILE = 27"),
-        ({"drop": ("actuator_servos",)}, "which output moves which surface is not known"),
+        ({"drop": ("actuator_servos",)}, r"ulg: no actuator_servos in it; SDLOG_PROFILE = 27 logs it in full [^)]*\)$"),
+        (
+            {"drop": ("actuator_controls_0",), "old": True},
+            r"ulg: no actuator_controls_0 in it; SDLOG_PROFILE = 27 logs it in full \([^)]*\)$",
+        ),
+        (
+            {"pulses": "MAIN", "parameters": {"PWM_MAIN_FUNC3": 0}},
+            r"ulg: which output moves which surface is not known \(no actuator_servos in it, and no PWM_MAIN_FUNCn or",
+        ),
         (
             {"rates": PX4_DEFAULT},
             "actuator_servos comes at 10 Hz; 20 Hz are needed; SDLOG_PROFILE = 27",
@@ -152,10 +177,13 @@ def test_truncated_and_damaged_logs(tmp_path):
     """A log that was cut short is used as far as it goes; one without content is one line."""
     record = px4_log(tmp_path / "flight.ulg")
     whole = (tmp_path / "flight.ulg").read_bytes()
-    (tmp_path / "short.ulg").write_bytes(whole[: len(whole) // 2])
+    (tmp_path / "short.ulg").write_bytes(whole[: len(whole) // 2 // 2 * 2 + 1])
     assert load_flight_record(tmp_path / "short.ulg", aircraft()).duration == pytest.approx(
         record.duration / 2, rel=0.1
     )
+    for name in ("short", "flight"):
+        said = [remark for remark in open_log(tmp_path / f"{name}.ulg").remarks if "cut short" in remark]
+        assert len(said) == (name == "short")
     (tmp_path / "head.ulg").write_bytes(whole[:400])
     with pytest.raises(InputError, match=r"head\.ulg"):
         load_flight_record(tmp_path / "head.ulg", aircraft())
@@ -166,6 +194,20 @@ def test_truncated_and_damaged_logs(tmp_path):
         assert load_flight_record(tmp_path / "damaged.ulg", aircraft()).duration > 0.2 * record.duration
     except InputError as error:
         assert "\n" not in str(error)
+
+
+def test_outputs_are_at_the_times_of_the_bank_that_is_named(tmp_path):
+    """Truth: the record. The servos are logged at 100 Hz, the pulses of actuator_outputs at 10 Hz."""
+    record = px4_log(tmp_path / "flight.ulg", slow_outputs=10.0)
+    words = [f"{name}=servo{i}:0:{-FULL[name]}" for name, i in (("aileron", 2), ("elevator", 3), ("rudder", 4))]
+    known = replace(aircraft(), outputs=f"{' '.join(words)} throttle=motor1:0:1")
+    back = load_flight_record(tmp_path / "flight.ulg", known)
+    at = np.searchsorted(record.time, record.time[0] + back.time + 1e-4) - 1
+    for name in ("de", "da", "dr"):
+        np.testing.assert_allclose(back[name], record[name][at], atol=1e-5, err_msg=name)
+    rows = {row.signal: row for row in survey(tmp_path / "flight.ulg", known).rows}
+    assert rows["controls"].source == "actuator_servos"
+    assert rows["controls"].rate == pytest.approx(100.0, rel=1e-3)
 
 
 def test_the_deflection_at_full_command_is_asked_for(tmp_path):

@@ -80,3 +80,41 @@ def test_a_flaps_torques_count_for_nothing():
     names, values = read(parameters, servos)
     assert names == ("aileron", "elevator", "rudder", "flap")
     np.testing.assert_allclose(values[:, :3], -STICKS, atol=1e-12)
+
+
+def test_a_torque_of_another_time_is_not_used():
+    """The servos are logged for 10 s, the torque from 30 s on. Truth: the servos' own commands."""
+    sticks = np.tile(STICKS, (100, 1))
+    stamps = np.arange(len(sticks), dtype=np.int64) * 16_000_000
+    servos = servos_of("elevons", 0.5, sticks)
+
+    def topic(name: str, columns: tuple[str, ...]) -> Signal:
+        if name == "actuator_servos":
+            return Signal(name, stamps, servos[:, : len(columns)])
+        if name == "vehicle_torque_setpoint":
+            later = 30_000_000_000 + np.arange(5000, dtype=np.int64) * 4_000_000
+            return Signal(name, later, np.zeros((5000, len(columns))))
+        return absent(name, len(columns))
+
+    controls, remarks = control_commands(topic, parameters_of("elevons", 0.5), vtol=False)
+    assert controls.signal.source == "actuator_servos"
+    assert remarks == ()
+    np.testing.assert_allclose(controls.signal.values[:, 1], -sticks[:, 1], atol=1e-12)
+
+
+def test_servos_on_both_banks_are_read_from_their_pulses():
+    """Truth: an aileron at output 2 of MAIN and an elevator at output 1 of AUX, half of the travel from the middle."""
+    parameters: dict[str, float] = {"CA_AIRFRAME": 1, "CA_SV_CS_COUNT": 2, "PWM_MAIN_FUNC2": 201, "PWM_AUX_FUNC1": 202}
+    parameters |= {"CA_SV_CS0_TYPE": 15, "CA_SV_CS0_TRQ_R": 1.0, "CA_SV_CS1_TYPE": 3, "CA_SV_CS1_TRQ_P": 1.0}
+    stamps = np.arange(10, dtype=np.int64) * 10_000_000
+    pulses = {("actuator_outputs", "output[1]"): 1750.0, ("actuator_outputs/1", "output[0]"): 1250.0}
+
+    def topic(name: str, columns: tuple[str, ...]) -> Signal:
+        if not name.startswith("actuator_outputs"):
+            return absent(name, len(columns))
+        values = [np.full(10, pulses.get((name, column), 900.0)) for column in columns]
+        return Signal(name, stamps, np.column_stack(values))
+
+    controls, _ = control_commands(topic, parameters, vtol=False)
+    assert controls.names == ("aileron", "elevator")
+    np.testing.assert_allclose(controls.signal.values, np.tile([-0.5, 0.5], (10, 1)))

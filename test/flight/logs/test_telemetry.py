@@ -15,7 +15,9 @@ G = 9.80665
 START_US = 1_700_000_000_000_000  # when the ground station's clock shows the autopilot's start
 
 
-def telemetry_log(path: Path, *, kind: int = 1, rate: int = 100, parameters: bool = True) -> None:
+def telemetry_log(
+    path: Path, *, kind: int = 1, rate: int = 100, parameters: bool = True, pressure: bool = True
+) -> None:
     """A .tlog of the simulated flight: each message after the time of its arrival, 20 ms after it was sent."""
     link = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
     record = flight().between(2.0, 9.0)
@@ -39,8 +41,9 @@ def telemetry_log(path: Path, *, kind: int = 1, rate: int = 100, parameters: boo
         send(ardupilotmega.MAVLink_attitude_message(ms, *angles, 0.0, 0.0, 0.0), at)
         equivalent = float(record["V"][i] * np.sqrt(record["rho"][i] / 1.225))
         send(ardupilotmega.MAVLink_vfr_hud_message(equivalent, 0.0, 0, 0, 0.0, 0.0), at)
-        pressure = float(record["rho"][i] * 287.05287 * 288.15 / 100.0)
-        send(ardupilotmega.MAVLink_scaled_pressure_message(ms, pressure, 0.0, 4500), at)
+        static = float(record["rho"][i] * 287.05287 * 288.15 / 100.0)
+        if pressure:
+            send(ardupilotmega.MAVLink_scaled_pressure_message(ms, static, 0.0, 4500), at)
         send(ardupilotmega.MAVLink_servo_output_raw_message(us, 0, *pulses[i].tolist(), 0, 0, 0, 0), at)
     path.write_bytes(body)
 
@@ -59,6 +62,7 @@ def test_the_flight_comes_back(tmp_path):
     ("options", "said"),
     [
         ({"kind": 2}, "never flew as a fixed wing"),
+        ({"pressure": False}, "no SCALED_PRESSURE in it, by whose density VFR_HUD's airspeed becomes the true one"),
         ({"parameters": False}, "which output moves which surface is not known"),
         ({"rate": 10}, "RAW_IMU comes at 10 Hz; 20 Hz are needed; SERVO_OUTPUT_RAW comes at 10 Hz; 20 Hz"),
     ],

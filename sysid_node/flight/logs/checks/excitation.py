@@ -55,6 +55,7 @@ _SINGULAR = 1e-6  # as a share, of directions in which outputs that move togethe
 _UNMOVED = 1e-6  # rad, or fractions
 _POSSIBLE = 1e6  # nothing that is measured or commanded is larger, in any unit
 _BRIDGED = 0.5  # s: values further apart than this are not connected
+_PAUSE = 10.0  # s that are left of a longer pause: by far more than what happens in it acts behind it
 _NO_EFFECT = {"throttle", "flap"}  # inputs that are no cause of an axis' motion to be looked for
 
 
@@ -129,7 +130,7 @@ class _Grid(NamedTuple):
     @classmethod
     def of(cls, imu: Signal, commands: LoggedCommands, places: Sequence[int]) -> _Grid | None:
         """The common time base; None where IMU and inputs do not overlap by some steps."""
-        signals = [_clean(imu), _clean(commands.signal)]
+        signals = _without_pauses([_clean(imu), _clean(commands.signal)])
         if min(time.size for time, _ in signals) < 2 or not places:
             return None
         step = max(float(np.median(np.diff(signals[0][0]))), _STEP)
@@ -151,6 +152,30 @@ def _clean(signal: Signal) -> tuple[Array, Array]:
         known = np.abs(column) < _POSSIBLE  # not so of NaN
         column[~known] = np.interp(time[~known], time[known], column[known]) if known.any() else 0.0
     return time, kept
+
+
+def _without_pauses(signals: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+    """The signals, of times (s) that increase, with pauses of any of them shortened to 10 s in all.
+
+    A clock that was set ahead would otherwise ask for more steps than there is memory.
+    """
+    pauses: list[tuple[float, float]] = []
+    for time, _ in signals:
+        long = np.flatnonzero(np.diff(time) > _PAUSE)
+        pauses += zip(time[long] + 0.5 * _PAUSE, time[long + 1] - 0.5 * _PAUSE, strict=True)
+    cut: list[tuple[float, float]] = []
+    for start, end in sorted(pauses):
+        if cut and start <= cut[-1][1]:
+            cut[-1] = cut[-1][0], max(cut[-1][1], end)
+        else:
+            cut.append((start, end))
+    shortened = list(signals)
+    for start, end in reversed(cut):
+        for i, (time, values) in enumerate(shortened):
+            kept = (time <= start) | (time >= end)
+            later = np.where(time >= end, end - start, 0.0)
+            shortened[i] = (time - later)[kept], values[kept]
+    return shortened
 
 
 def _connected(time: Array, edges: Array, step: float) -> NDArray[np.bool_]:

@@ -70,7 +70,7 @@ def missing_signals(log: AutopilotLog, *, raw_outputs: bool) -> tuple[str, ...]:
 def _useless(log: AutopilotLog, *, raw_outputs: bool) -> tuple[str, ...]:
     """Why nothing of a log can be used."""
     if not len(log.imu):
-        return (f"no {log.imu.source} in it; {log.remedies.get(IMU, 'record it too')}",)
+        return (log.lacks.get(IMU) or f"no {log.imu.source} in it; {log.remedies.get(IMU, 'record it too')}",)
     faults = clock_faults(log, raw_outputs=raw_outputs)
     if faults:
         return (f"{next(iter(faults.values()))} (a clock was set); cut the log there",)
@@ -109,9 +109,9 @@ def missing_airspeed(log: AutopilotLog) -> str:
     name = log.airspeed.source
     values = log.airspeed.values[within(log.flown or None, log.airspeed.stamp_ns), 0]
     if not values.size:
-        return f"no {name} in it; connect an airspeed sensor, and log it"
+        return log.lacks.get(AIRSPEED) or f"no {name} in it; connect an airspeed sensor, and log it"
     if not np.isfinite(values).any():
-        return f"{name} never comes from a sensor; connect an airspeed sensor"
+        return log.lacks.get(AIRSPEED) or f"{name} never comes from a sensor; connect an airspeed sensor"
     if float(np.nanmax(values)) < _SLOWEST:
         return f"{name} is {float(np.nanmax(values)):.1f} m/s at most: the airspeed sensor did not work"
     return ""
@@ -119,11 +119,14 @@ def missing_airspeed(log: AutopilotLog) -> str:
 
 def missing_controls(log: AutopilotLog, *, raw_outputs: bool) -> str:
     """Why no commands of the controls are known, or an empty text."""
-    if raw_outputs:
-        return "" if len(log.outputs.signal) else f"no {log.outputs.signal.source} in it; record it too"
-    if log.controls.names and len(log.controls.signal):
+    known = len(log.outputs.signal) if raw_outputs else log.controls.names and len(log.controls.signal)
+    if known:
         return ""
-    why = "; ".join(log.remarks) or f"no {log.controls.signal.source} in it"
+    if CONTROLS in log.lacks:
+        return log.lacks[CONTROLS]
+    if raw_outputs:
+        return f"no {log.outputs.signal.source} in it; {log.remedies.get(CONTROLS, 'record it too')}"
+    why = log.unmapped or f"no {log.controls.signal.source} in it"
     return (
         f"which output moves which surface is not known ({why}); write it into the aircraft file, "
         'e.g. outputs: "elevator=out2:1500:0.001 aileron=out1:1500:0.001"'

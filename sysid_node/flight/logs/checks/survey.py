@@ -14,7 +14,7 @@ from sysid_node.flight.align import STEP_BACK_NS
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
-from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, AutopilotLog, Signal
+from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, AutopilotLog, Signal, with_outputs_of
 from sysid_node.flight.logs.autopilot_log import IMU as IMU_ROLE
 from sysid_node.flight.logs.checks.excitation import excitation
 from sysid_node.flight.logs.checks.inputs import Inputs, inputs_of_joints, inputs_of_log
@@ -26,7 +26,7 @@ from sysid_node.flight.logs.checks.refusals import (
     refusal_of_streams,
     step_back,
 )
-from sysid_node.flight.logs.content import content_of
+from sysid_node.flight.logs.content import content_of, remapped, say_that_axes_are_known
 from sysid_node.flight.logs.flown import within
 from sysid_node.flight.logs.log_streams import part_remarks
 from sysid_node.flight.logs.opening import is_table, read_autopilot_log
@@ -34,7 +34,7 @@ from sysid_node.flight.logs.rates import SampleRate, rate_of, rates_of_log, rate
 from sysid_node.flight.logs.record_streams import incomplete_streams, missing_columns
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.streams import COMMAND_FRACTIONS, Streams
-from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, topic_names
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
 #: A gap is a step between samples of more than this many usual ones, and of more than 0.1 s.
 _GAP_STEPS, _GAP = 3.0, 0.1
@@ -134,11 +134,12 @@ def survey(
     ``topics`` and ``frame`` are for bags of our own topics, as of ``open_streams``.
     """
     path = Path(path)
-    remapped = topics is not None and dict(topics) != topic_names()
-    log = None if remapped else read_autopilot_log(path)
+    other_topics = remapped(path, topics)
+    log = None if other_topics else read_autopilot_log(path)
     if log is not None:
+        say_that_axes_are_known(path, frame, f"log of {log.autopilot}")
         return _surveyed(path.name, log.autopilot, _of_log(log, aircraft), aircraft)
-    if not remapped and is_table(path):
+    if is_table(path, topics, frame):
         record = read_csv(path)
         found = _of_streams(incomplete_streams(record), None)  # whose joints are the controls
         found = replace(found, incomplete=missing_columns(record), gap_lacks=_not_whole(record))
@@ -156,6 +157,7 @@ def _not_whole(record: FlightRecord) -> tuple[str, ...]:
 
 def _of_log(log: AutopilotLog, aircraft: Aircraft | None) -> _Signals:
     raw = bool(aircraft.outputs) if aircraft is not None else False
+    log = with_outputs_of(log, aircraft.outputs) if aircraft is not None else log
     set_back = clock_faults(log, raw_outputs=raw)
     spans = None if set_back else log.flown or None  # no time of a clock that was set tells when it flew
 

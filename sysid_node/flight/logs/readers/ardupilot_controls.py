@@ -45,11 +45,13 @@ def control_commands(
     full = at_full_stick(np.array([_gains(functions[i], parameters) for i in surfaces]))
     names, fractions = unmixed(full, commands)
     columns = [fractions]
+    reverse = parameters.get("THR_MIN", 0.0) < 0.0  # ArduPlane then scales the throttle from the trim to either side
     for name, wanted in (("flap", _FLAPS), ("throttle", _THROTTLES)):
         places = [i for i, function in functions.items() if function in wanted and np.isfinite(pulses[:, i]).any()]
         if places:
             names = (*names, name)
-            columns.append(np.mean([_range(pulses[:, i], i + 1, parameters) for i in places], axis=0)[:, np.newaxis])
+            scaled = _angle if name == "throttle" and reverse else _range
+            columns.append(np.mean([scaled(pulses[:, i], i + 1, parameters) for i in places], axis=0)[:, np.newaxis])
     signal = Signal(outputs.signal.source, outputs.signal.stamp_ns, np.hstack(columns))
     still = ("MIXING_GAIN is 0: elevons and V-tails do not move",) if not full.any(axis=1).all() else ()
     return LoggedCommands(names, signal), still

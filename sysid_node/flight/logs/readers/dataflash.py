@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from sysid_node.flight.autopilots.base import GAS_CONSTANT, SEA_LEVEL_DENSITY
 from sysid_node.flight.frames import quaternion_from_euler
 from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, LoggedCommands, Signal, absent
 from sysid_node.flight.logs.flown import Condition, Spans, spans_where
+from sysid_node.flight.logs.outliers import in_order, said_of
 from sysid_node.flight.logs.readers.ardupilot_controls import control_commands
 from sysid_node.flight.logs.readers.packages import quietly, required
 from sysid_node.flight.record import Array
@@ -35,6 +37,8 @@ _REMEDIES = {
     CONTROLS: "LOG_BITMASK: set bit 13 (RC): RCOU then comes at 25 Hz, which serves for smooth commands, not for steps",
 }
 
+_NO_BARO = "no BARO in it, by whose density ARSP becomes the true airspeed; LOG_BITMASK: set bit 7 (IMU)"
+
 Rows = dict[str, list[dict[str, Any]]]
 
 
@@ -49,7 +53,18 @@ def read_dataflash(path: str | Path, *, text: bool = False) -> AutopilotLog:
     except Exception as error:  # the parser of a damaged file raises all kinds of exceptions
         words = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path.name}: cannot be read as an ArduPilot log: {words}; copy it again") from error
-    return _converted(rows, path.name)
+    return _converted(*_without_outliers(rows), path.name)
+
+
+def _without_outliers(rows: Rows) -> tuple[Rows, int]:
+    """The messages without single ones of another time, and how many those were."""
+    kept, count = defaultdict(list, rows), 0
+    for kind, of_kind in rows.items():
+        if of_kind and "TimeUS" in of_kind[0]:
+            keep = in_order(np.array([int(row["TimeUS"]) for row in of_kind], np.int64) * 1000)
+            kept[kind] = [row for row, fits in zip(of_kind, keep.tolist(), strict=True) if fits]
+            count += len(of_kind) - len(kept[kind])
+    return kept, count
 
 
 def _advancing(reader: Any) -> Any:
@@ -80,10 +95,11 @@ def _rows(log: Any) -> Rows:
         rows[fields.pop("mavpackettype")].append(fields)
 
 
-def _converted(rows: Rows, name: str) -> AutopilotLog:
+def _converted(rows: Rows, left_out: int, name: str) -> AutopilotLog:
     parameters = {row["Name"]: float(row["Value"]) for row in rows["PARM"]}
     outputs = _outputs(rows)
     controls, remarks = control_commands(outputs, parameters)
+    unmapped, remedies = remarks, _remedies(parameters)
     imu, attitude = _imu(rows, parameters), _attitude(rows)
     density = _density(rows)
     if rows["AOA"]:
@@ -98,9 +114,27 @@ def _converted(rows: Rows, name: str) -> AutopilotLog:
         controls=controls,
         outputs=outputs,
         flown=_flown(rows, int(imu.stamp_ns[-1]) if len(imu) else 0),
-        remarks=remarks,
-        remedies=_REMEDIES,
+        remarks=remarks + said_of(left_out),
+        remedies=remedies,
+        lacks=_lacks(outputs, density, remedies),
+        unmapped="; ".join(unmapped),
     )
+
+
+def _lacks(outputs: LoggedCommands, density: Signal, remedies: Mapping[str, str]) -> dict[str, str]:
+    lacking = {} if len(density) else {AIRSPEED: _NO_BARO}
+    return lacking if len(outputs.signal) else {**lacking, CONTROLS: f"no RCOU in it; {remedies[CONTROLS]}"}
+
+
+def _remedies(parameters: Mapping[str, float]) -> dict[str, str]:
+    """What raises the rate of each signal: bits of LOG_BITMASK that are not set yet, or what else slows it down."""
+    mask = int(parameters.get("LOG_BITMASK", 0))
+    found = dict(_REMEDIES)
+    if mask & 129 == 129:
+        found[IMU] = "LOG_BITMASK has bits 0 and 7 set; raise SCHED_LOOP_RATE, or look for dropped messages (DSF.Dp)"
+    if mask >> 13 & 1:
+        found[CONTROLS] = "LOG_BITMASK has bit 13 (RC) set, which gives 25 Hz at most; look for dropped messages"
+    return found
 
 
 def _firmware(rows: Rows) -> str:
@@ -174,6 +208,8 @@ def _airspeed(rows: Rows, density: Signal) -> Signal:
     equivalent = _signal(chosen, name, ("Airspeed",))
     healthy = np.array([row.get("H", 1) != 0 for row in chosen], bool)
     equivalent.values[~healthy] = np.nan
+    if not len(density):
+        equivalent.values[:] = np.nan  # it is no true airspeed
     if not len(equivalent) or not len(density):
         return equivalent
     at = np.interp(equivalent.stamp_ns.astype(float), density.stamp_ns.astype(float), density.values[:, 0])

@@ -40,6 +40,9 @@ _WITHOUT_TORQUE = (9, 10, 11, 16, 17, 18)
 #: The torque reproduces the servos where four errors of five are below this share of the servos' standard deviation.
 _REPRODUCED = 0.1
 
+#: The servos are compared with the torque at so many samples or more.
+_FEWEST = 20
+
 #: Gains of the mixer below this are rounding.
 _NO_GAIN = 1e-3
 
@@ -58,6 +61,9 @@ def control_commands(topic: Topic, parameters: Parameters, *, vtol: bool) -> tup
         servos = _servos_of_pulses(topic, parameters, count)
     if count and len(servos):
         return _from_servos(topic, parameters, servos, vtol=vtol)
+    if count:
+        remark = "no actuator_servos in it, and no PWM_MAIN_FUNCn or PWM_AUX_FUNCn of actuator_outputs names each servo"
+        return LoggedCommands((), absent("actuator_servos", 0)), (remark,)
     return _from_axes(topic, vtol=vtol)
 
 
@@ -105,10 +111,12 @@ def _refined(servos: Signal, topic: Topic, names: tuple[str, ...], *, vtol: bool
     """The commands at the rate of the torque setpoint, where this is faster and reproduces them."""
     columns = tuple(f"xyz[{AXES.index(name)}]" for name in names)
     torque = topic("vehicle_torque_setpoint/1" if vtol else "vehicle_torque_setpoint", columns)
-    if len(servos) < 20 or len(torque) < 1.5 * len(servos):
+    if len(servos) < _FEWEST or len(torque) < 1.5 * len(servos):
         return servos, ()
     at_servos = _interpolated(torque, servos.stamp_ns)
     inside = np.isfinite(at_servos).all(axis=1) & np.isfinite(servos.values).all(axis=1)
+    if np.count_nonzero(inside) < _FEWEST:  # the torque was logged at another time
+        return servos, ()
     fine = np.empty((len(torque), len(names)))
     for i in range(len(names)):
         design = np.column_stack([at_servos[inside, i], np.ones(int(inside.sum()))])
@@ -135,20 +143,34 @@ def _throttle(topic: Topic, parameters: Parameters, at_ns: Stamps) -> Array | No
 
 
 def _servos_of_pulses(topic: Topic, parameters: Parameters, count: int) -> Signal:
-    """The servos' commands -1..1 from the pulses of actuator_outputs, by PWM_*_FUNC, _MIN, _MAX and _REV."""
+    """The servos' commands -1..1 from the pulses of actuator_outputs, by PWM_*_FUNC, _MIN, _MAX and _REV.
+
+    They are at the times of the bank with most servos; of the other bank the last samples before are taken.
+    """
+    servos = [_servo_of_pulses(topic, parameters, i) for i in range(count)]
+    found = [servo for servo in servos if servo is not None]
+    if len(found) < count:
+        return absent("actuator_servos", count)
+    sizes = [sum(other.source == servo.source for other in found) for servo in found]
+    base = found[sizes.index(max(sizes))].stamp_ns
+    columns = [_last_values(servo, servo.values[:, 0], base) for servo in found]
+    return Signal("actuator_outputs", base, np.column_stack(columns))
+
+
+def _servo_of_pulses(topic: Topic, parameters: Parameters, number: int) -> Signal | None:
+    """The commands (N, 1) of a servo, counted from 0; None where no output that was logged is its own."""
     for instance, bank in enumerate(("MAIN", "AUX")):
-        places = [_output_of(parameters, bank, _FIRST_SERVO + i) for i in range(count)]
-        if any(place < 0 for place in places):
+        place = _output_of(parameters, bank, _FIRST_SERVO + number)
+        if place < 0:
             continue
-        name = f"actuator_outputs/{instance}" if instance else "actuator_outputs"
-        pulses = topic(name, tuple(f"output[{place}]" for place in places))
-        low = np.array([parameters.get(f"PWM_{bank}_MIN{place + 1}", 1000.0) for place in places])
-        high = np.array([parameters.get(f"PWM_{bank}_MAX{place + 1}", 2000.0) for place in places])
-        reversed_bits = int(parameters.get(f"PWM_{bank}_REV", 0))
-        sign = np.array([-1.0 if reversed_bits >> place & 1 else 1.0 for place in places])
+        pulses = topic(f"actuator_outputs/{instance}" if instance else "actuator_outputs", (f"output[{place}]",))
+        low = parameters.get(f"PWM_{bank}_MIN{place + 1}", 1000.0)
+        high = parameters.get(f"PWM_{bank}_MAX{place + 1}", 2000.0)
+        sign = -1.0 if int(parameters.get(f"PWM_{bank}_REV", 0)) >> place & 1 else 1.0
         fractions = sign * (2.0 * (pulses.values - low) / (high - low) - 1.0)
-        return Signal("actuator_outputs", pulses.stamp_ns, np.clip(fractions, -1.0, 1.0))
-    return absent("actuator_servos", count)
+        if len(pulses):
+            return Signal(bank, pulses.stamp_ns, np.clip(fractions, -1.0, 1.0))
+    return None
 
 
 def _output_of(parameters: Parameters, bank: str, function: int) -> int:

@@ -38,6 +38,10 @@ _IN_AIR, _AS_FIXED_WING = 2, 4  # MAV_LANDED_STATE, MAV_VTOL_STATE
 _RATE = "request the message at a higher rate (MAV_CMD_SET_MESSAGE_INTERVAL), or give the log of the autopilot's card"
 _REMEDIES = {IMU: _RATE, AIRSPEED: _RATE, CONTROLS: _RATE}
 
+_NO_PRESSURE = (
+    "no SCALED_PRESSURE in it, by whose density VFR_HUD's airspeed becomes the true one; request that message, too"
+)
+
 #: Outside temperature (degC) that the density is computed with: telemetry has the board's alone.
 _TEMPERATURE = 15.0
 
@@ -90,11 +94,15 @@ def _converted(rows: Rows, vehicle: tuple[int, int], name: str) -> AutopilotLog:
     parameters = {row.fields["param_id"]: float(row.fields["param_value"]) for row in rows["PARAM_VALUE"]}
     outputs = _outputs(rows, clock)
     controls, remarks = control_commands(outputs, parameters)
+    unmapped = remarks
     imu = _imu(rows, clock)
     density = _density(rows, clock)
     remarks += (
         f"air density: from the static pressure at {_TEMPERATURE:g} degC, as telemetry has no outside temperature",
     )
+    lacking = {} if len(density) else {AIRSPEED: _NO_PRESSURE}
+    if not len(outputs.signal):
+        lacking[CONTROLS] = f"no SERVO_OUTPUT_RAW in it; {_RATE}"
     flown = _flown(rows, clock, int(imu.stamp_ns[-1]) if len(imu) else 0)
     return AutopilotLog(
         name=name,
@@ -108,6 +116,8 @@ def _converted(rows: Rows, vehicle: tuple[int, int], name: str) -> AutopilotLog:
         flown=flown if vehicle[1] in _WINGED else (),
         remarks=remarks,
         remedies=_REMEDIES,
+        lacks=lacking,
+        unmapped="; ".join(unmapped),
     )
 
 
@@ -160,6 +170,8 @@ def _density(rows: Rows, clock: _Clock) -> Signal:
 def _airspeed(rows: Rows, clock: _Clock, density: Signal) -> Signal:
     """True airspeed from VFR_HUD's, which is equivalent."""
     equivalent = _signal(rows["VFR_HUD"], clock, "VFR_HUD", ("airspeed",))
+    if not len(density):
+        equivalent.values[:] = np.nan  # it is no true airspeed
     if not len(equivalent) or not len(density):
         return equivalent
     at = np.interp(equivalent.stamp_ns.astype(float), density.stamp_ns.astype(float), density.values[:, 0])

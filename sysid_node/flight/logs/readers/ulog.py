@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import mmap
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sysid_node.errors import InputError
-from sysid_node.flight.logs.autopilot_log import AIRSPEED, CONTROLS, IMU, AutopilotLog, LoggedCommands, Signal, absent
+from sysid_node.flight.logs.autopilot_log import (
+    AIRSPEED,
+    CONTROLS,
+    IMU,
+    AutopilotLog,
+    LoggedCommands,
+    Signal,
+    absent,
+    joined,
+)
 from sysid_node.flight.logs.flown import Condition, Spans, spans_where
+from sysid_node.flight.logs.outliers import in_order, said_of
 from sysid_node.flight.logs.readers.packages import quietly, required
 from sysid_node.flight.logs.readers.px4_controls import control_commands
 from sysid_node.flight.record import Array
@@ -18,6 +29,8 @@ from sysid_node.flight.streams import Stamps
 _PROFILE = (
     "SDLOG_PROFILE = 27 logs it in full (bits 0 default, 1 estimator replay, 3 system identification, 4 high rate)"
 )
+
+_CUT_SHORT = "the file ends within a message: the log was cut short, by a loss of power or when it was copied"
 
 _REMEDIES = {IMU: _PROFILE, AIRSPEED: _PROFILE, CONTROLS: _PROFILE}
 
@@ -34,10 +47,20 @@ def read_ulog(path: str | Path) -> AutopilotLog:
     try:
         with quietly():  # pyulog prints what it makes of a damaged file
             log = _Topics(core.ULog(str(path)))
+        cut = not (log.ulog.file_corruption or log.ulog.has_data_appended) and _ends_within_a_message(path)
     except Exception as error:  # the parser of a damaged file raises all kinds of exceptions
         words = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path.name}: cannot be read as a PX4 log: {words}; copy it again from the card") from error
-    return _converted(log, path.name)
+    return _converted(log, path.name, (_CUT_SHORT,) if cut else ())
+
+
+def _ends_within_a_message(path: Path) -> bool:
+    """Whether the last message is not whole: a header of 16 bytes, then messages that begin with their sizes."""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        at = 16
+        while at + 2 < len(content):
+            at += 3 + content[at] + 256 * content[at + 1]
+        return at != len(content)
 
 
 class _Topics:
@@ -46,6 +69,11 @@ class _Topics:
     def __init__(self, ulog: Any) -> None:
         self.ulog = ulog
         self.data = {(one.name, one.multi_id): one.data for one in ulog.data_list}
+        self.left_out = 0  # messages
+        for key, columns in self.data.items():
+            keep = in_order(np.asarray(columns["timestamp"], np.int64) * 1000)
+            self.left_out += int(np.count_nonzero(~keep))
+            self.data[key] = columns if keep.all() else {name: values[keep] for name, values in columns.items()}
         self.parameters: dict[str, float] = {name: float(value) for name, value in ulog.initial_parameters.items()}
 
     def fields(self, topic: str) -> dict[str, Array]:
@@ -73,11 +101,13 @@ class _Topics:
         )
 
 
-def _converted(log: _Topics, name: str) -> AutopilotLog:
+def _converted(log: _Topics, name: str, damage: tuple[str, ...]) -> AutopilotLog:
     status = log.fields("vehicle_status")
     vtol = bool(np.any(status.get("is_vtol", np.zeros(1))))
     controls, remarks = control_commands(log.signal, log.parameters, vtol=vtol)
     airspeed, airspeed_remarks = _airspeed(log)
+    unmapped, banks = "; ".join(remarks), _banks(log)
+    outputs = joined(banks, banks[0].signal if banks else absent("actuator_outputs", 0))
     imu = _imu(log)
     dropped = sum(dropout.duration for dropout in log.ulog.dropouts) / 1000.0
     if dropped:
@@ -92,12 +122,21 @@ def _converted(log: _Topics, name: str) -> AutopilotLog:
         airspeed=airspeed,
         density=log.signal("vehicle_air_data", ("rho",)),
         controls=controls,
-        outputs=_outputs(log),
+        outputs=outputs,
+        banks=banks,
         vanes=_vanes(log),
         flown=_flown(log, int(imu.stamp_ns[-1]) if len(imu) else 0),
-        remarks=(*remarks, *airspeed_remarks),
+        remarks=(*remarks, *airspeed_remarks, *damage, *said_of(log.left_out)),
         remedies=_REMEDIES,
+        lacks=_lacks(controls, outputs),
+        unmapped=unmapped,
     )
+
+
+def _lacks(controls: LoggedCommands, outputs: LoggedCommands) -> dict[str, str]:
+    """Commands that were not logged at all: those of motors alone move no surface."""
+    surfaces = [name for name in outputs.names if not name.startswith("motor")]
+    return {} if controls.names or surfaces else {CONTROLS: f"no {controls.signal.source} in it; {_PROFILE}"}
 
 
 def _version(ulog: Any) -> str:
@@ -128,18 +167,23 @@ def _imu(log: _Topics) -> Signal:
 def _airspeed(log: _Topics) -> tuple[Signal, tuple[str, ...]]:
     """The validated airspeed where a sensor measured it, or the sensor's own where that was logged faster.
 
-    The sensor's is multiplied by the scale that the validated one contains.
+    The sensor's is multiplied by the scale that the validated one contains, and taken where the validated one is of
+    this sensor: PX4 turns to another source where it finds that a sensor is blocked.
     """
     fields = log.fields("airspeed_validated")
     valid = log.signal("airspeed_validated", ("true_airspeed_m_s",))
     source = fields.get("airspeed_source", fields.get("selected_airspeed_index"))
-    if source is not None:
+    if source is None or not len(valid):
+        raw = log.signal("airspeed", ("true_airspeed_m_s",))
+    else:
         measured = (source >= 1) & (source <= 3)
         valid.values[~measured] = np.nan
-        instance = int(np.median(source[measured])) - 1 if np.any(measured) else 0
-        raw = log.signal(f"airspeed/{instance}" if instance else "airspeed", ("true_airspeed_m_s",))
-    else:
-        raw = log.signal("airspeed", ("true_airspeed_m_s",))
+        if not np.any(measured):
+            return valid, ()
+        sensor = int(np.bincount(source[measured]).argmax())
+        raw = log.signal(f"airspeed/{sensor - 1}" if sensor > 1 else "airspeed", ("true_airspeed_m_s",))
+        place = np.searchsorted(valid.stamp_ns, raw.stamp_ns, side="right") - 1
+        raw.values[source[np.maximum(place, 0)] != sensor] = np.nan
     if not len(raw) or len(raw) <= 1.5 * len(valid):
         return valid if len(valid) else raw, ()
     scale = _scale_between(raw, valid)
@@ -186,24 +230,18 @@ def _at_times(signal: Signal, other: Signal) -> Array:
     return values
 
 
-def _outputs(log: _Topics) -> LoggedCommands:
+def _banks(log: _Topics) -> tuple[LoggedCommands, ...]:
     """The outputs by the names in the aircraft file: main1.., aux1.. (pulses), servo1.., motor1.. (-1..1)."""
     banks = {"main": log.signal("actuator_outputs", tuple(f"output[{i}]" for i in range(8)))}
     if ("actuator_outputs", 1) in log.data:
         banks["aux"] = log.signal("actuator_outputs/1", tuple(f"output[{i}]" for i in range(8)))
     banks["servo"] = log.signal("actuator_servos", tuple(f"control[{i}]" for i in range(8)))
     banks["motor"] = log.signal("actuator_motors", tuple(f"control[{i}]" for i in range(12)))
-    base = next((bank for bank in banks.values() if len(bank)), absent("actuator_outputs", 0))
-    names: list[str] = []
-    columns: list[Array] = []
-    for bank, signal in banks.items():
-        if not len(signal):
-            continue
-        place = np.clip(np.searchsorted(signal.stamp_ns, base.stamp_ns, side="right") - 1, 0, len(signal) - 1)
-        names += [f"{bank}{i + 1}" for i in range(signal.values.shape[1])]
-        columns += list(signal.values[place].T)
-    values = np.column_stack(columns) if columns else np.empty((0, 0))
-    return LoggedCommands(tuple(names), Signal(base.source, base.stamp_ns, values))
+    return tuple(
+        LoggedCommands(tuple(f"{bank}{i + 1}" for i in range(signal.values.shape[1])), signal)
+        for bank, signal in banks.items()
+        if len(signal)
+    )
 
 
 def _flown(log: _Topics, end_ns: int) -> Spans | None:
