@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,16 @@ def test_a_smooth_flight_held_out_is_read_as_the_commands_that_it_holds(tmp_path
     assert (steps.record.commanded, smooth.record.commanded) == (True, False)
     held_out = identify(steps, "equation_error", holdout=[smooth]).run.holdout["smooth"]
     assert min(held_out["Cl"]["r_squared"], held_out["Cm"]["r_squared"]) > 0.95  # below zero as positions
+
+
+def test_offsets_are_not_excited_where_a_control_does_not_move(flight, tmp_path):
+    """An elevator that stays where it is cannot be told from an offset."""
+    record = flight.record.between(0.0, 24.0)
+    columns = {**record.columns, "de": np.full(len(record), 0.02)}
+    write_csv(tmp_path / "still.csv", replace(record, columns=columns))
+    found = replay(load(tmp_path / "still.csv", "cdrw"), {"publish_rate": 1.0}).final.derivatives
+    assert {found[name].status for name in ("CL_0", "CL_de", "Cm_0", "Cm_de")} == {"not excited"}
+    assert found["Cl_p"].valid
 
 
 def test_without_pandas_one_line_says_so(replayed, monkeypatch):
