@@ -203,7 +203,6 @@ def _reasons(
         rivals = least_squares.most_correlated(state.equations, current.solution).take(table.unknown)
         reasons[collinear] = state.model.vocabulary.collinear + rivals[collinear]
     if np.count_nonzero(buried):
-        reasons[(buried.take(table.unknown) & slopes) | (_with_hidden_slope(state, buried) & asked)] = (
-            status.NOT_EXCITED
-        )
+        of_slope = buried.take(table.unknown) & slopes
+        reasons[of_slope | (_with_hidden_slope(state, buried) & asked)] = status.NOT_EXCITED
     return reasons
