@@ -33,9 +33,14 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 
 def run(args: argparse.Namespace) -> None:
-    """Prints a table for each log. Raises InputError after the last where one could not be read."""
+    """Prints a table for each log. Raises after the last where one could not be read.
+
+    InputError where all of these are bad input, RuntimeError where a reader failed.
+    """
     aircraft = load_aircraft(args.aircraft) if args.aircraft else None
-    topics, frame, unread = topic_names(args.topic), args.body_frame, []
+    topics, frame = topic_names(args.topic), args.body_frame
+    unread: list[str] = []
+    kind: type[Exception] = InputError
     for path in args.logs:
         try:
             found = survey(path, aircraft, topics, frame)
@@ -47,9 +52,10 @@ def run(args: argparse.Namespace) -> None:
         except Exception as error:  # a fault of a reader must not hide the other files
             if args.debug:
                 traceback.print_exc()
-            unread.append(f"{path.name}: failed: {type(error).__name__}: {error} (more with --debug)")
+            unread.append(f"{path.name}: {type(error).__name__}: {error}")
+            kind = RuntimeError
     if unread:
-        raise InputError("; ".join(unread))
+        raise kind("; ".join(unread))
 
 
 def _show(found: LogSurvey, good_for: Mapping[str, str]) -> None:

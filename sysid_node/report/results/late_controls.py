@@ -26,9 +26,10 @@ def late_controls(
     """
     followed = controls.copy()
     for i, (name, servo) in enumerate(zip(aircraft.controls, servos_of(aircraft)[1:], strict=True)):
-        late = servos[name].value if name in servos else 0.0
-        more = late - (of_servo(servo)[0] if commanded else 0.0)
-        if math.isfinite(more) and abs(more) > _EXACT and name in servos:
+        if name not in servos:
+            continue
+        more = servos[name].value - (of_servo(servo)[0] if commanded else 0.0)
+        if math.isfinite(more) and abs(more) > _EXACT:
             followed[:, i] = _behind(time, controls[:, i], more)
     return followed
 

@@ -127,7 +127,7 @@ def status_words(status: str) -> str:
     """A status in words for a pilot; an unknown status is returned as it is."""
     control, late, _ = status.partition(" not on time")
     if late:
-        return f"the servo lag or the clock of {REGRESSOR_WORDS.get(control, control)} is not known well enough"
+        return f"how late the {REGRESSOR_WORDS.get(control, control)} follows is not known well enough"
     return next((words for start, words in STATUS_WORDS.items() if status.startswith(start)), status)
 
 

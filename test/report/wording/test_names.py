@@ -14,7 +14,7 @@ from sysid_node.report.wording.names import status_words
             "unconfirmed: collinear with q",
             "biased by gusts or a model error, and not known to the online estimator",
         ),
-        ("dr not on time", "the servo lag or the clock of rudder is not known well enough"),
+        ("dr not on time", "how late the rudder follows is not known well enough"),
         ("something new", "something new"),
     ],
 )
