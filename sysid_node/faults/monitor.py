@@ -12,7 +12,7 @@ it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import islice
 
 import numpy as np
@@ -38,9 +38,9 @@ from sysid_node.faults.hypotheses.weighing import (
 )
 from sysid_node.faults.model import blocks, gust_correlation, reference_model, residual_whitening
 from sysid_node.faults.model.blocks import PERIOD, Block
-from sysid_node.faults.model.reference_model import IdentifierEstimate, ModelPrior
+from sysid_node.faults.model.reference_model import IdentifierEstimates, ModelPrior
 from sysid_node.faults.model.residual_whitening import ORDER
-from sysid_node.faults.model.terms import Terms, terms
+from sysid_node.faults.model.terms import Terms, design_of, terms
 from sysid_node.faults.report import Detection, fault_of
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.state import LAG, SPANS, Alarm, FaultHypotheses, MonitorState, WhitenedBlock
@@ -71,7 +71,7 @@ def init(aircraft: Aircraft, settings: FaultMonitorSettings) -> MonitorState:
     return MonitorState(aircraft, settings, known, made, reference_model.init(known), whitening)
 
 
-def receive_estimates(state: MonitorState, time: float, known: Mapping[str, IdentifierEstimate]) -> None:
+def receive_estimates(state: MonitorState, time: float, known: IdentifierEstimates) -> None:
     """Take the identifier's estimates at a time (s, as the samples')."""
     if state.alarm is None:
         reference_model.receive_estimates(state.reference, time, known)
@@ -110,8 +110,7 @@ def take(state: MonitorState, block: Block) -> None:
 
 def _compare_with_reference(state: MonitorState, block: Block) -> tuple[Array, Array]:
     """The regressors of a block by term (6, D), and its residual (6,) of the reference model."""
-    design = np.zeros((6, len(state.terms.names)))
-    design[state.terms.output, np.arange(design.shape[1])] = block.regressors[state.terms.column]
+    design = design_of(state.terms, state.reference.values, block.regressors, block.behind)
     return design, block.outputs - design @ state.reference.values
 
 
@@ -148,7 +147,8 @@ def _learn(state: MonitorState, block: Block, residual: Array) -> None:
     known = state.reference
     weight = max(PERIOD / OFFSETS, 1.0 / (state.history.count or 1))
     known.offsets += weight * (residual / block.regressors[OFFSET] - known.offsets)
-    known.regressors += weight * (block.regressors[state.terms.column] - known.regressors)
+    plain = state.terms.derivatives
+    known.regressors[plain] += weight * (block.regressors[state.terms.column[plain]] - known.regressors[plain])
 
 
 def _learn_model(state: MonitorState) -> None:
@@ -167,16 +167,22 @@ def _learn_model(state: MonitorState) -> None:
 
 
 def _explained(terms: Terms, last: Sequence[Block]) -> NDArray[np.bool_]:
-    """(D,) the terms of the coefficients whose regression on their regressors has a large R^2 in these blocks."""
-    outputs, regressors = (np.array([getattr(b, name) for b in last]) for name in ("outputs", "regressors"))
+    """(D,) the terms of the coefficients whose regression on their regressors has a large R^2 in these blocks.
+
+    A servo's terms enter several coefficients, and are learned where all of these have.
+    """
+    outputs, regressors, behind = (np.array([getattr(b, name) for b in last]) for name in Block._fields[1:4])
     found = np.zeros(len(terms.names), dtype=bool)
-    for output in set(terms.output.tolist()):
+    for output in terms.coefficients:
         mine = terms.output == output
+        lagged = [terms.column[servo] for servo, derivatives in terms.servos.values() if mine[derivatives].any()]
         y = outputs[:, output] - outputs[:, output].mean()
-        X = regressors[:, terms.column[mine]]
+        X = np.column_stack([regressors[:, terms.column[mine]], *(behind[:, columns] for columns in lagged)])
         X = X - X.mean(axis=0)
         left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
         found[mine] = left @ left < (1.0 - EXPLAINED) * (y @ y)
+    for servo, derivatives in terms.servos.values():
+        found[servo] = found[derivatives].all()
     return found
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults.hypotheses import rate_limits
 from sysid_node.faults.model import blocks, residual_whitening
-from sysid_node.faults.model.terms import terms
+from sysid_node.faults.model.terms import design_of, terms
 from sysid_node.faults.types import Fault
 from sysid_node.flight.record import FlightRecord
 from sysid_node.online.types import SAMPLE_COLUMNS
@@ -29,14 +29,12 @@ def rate_limits_of(aircraft: Aircraft, flight: FlightRecord) -> list[Fault]:
     averaged = blocks.init(aircraft)
     model = terms(aircraft, averaged.layout)
     state, whitening = rate_limits.init(aircraft, model), residual_whitening.init(MEMORY, blocks.PERIOD)
-    places = np.arange(len(model.names))
     for moment, sample in zip(flight.time.tolist(), samples.tolist(), strict=True):
         rate_limits.move(state, moment, sample)
         block = blocks.add(averaged, moment, sample)
         if block is None:
             continue
-        design = np.zeros((6, places.size))
-        design[model.output, places] = block.regressors[model.column]
+        design = design_of(model, model.values, block.regressors, block.behind)
         residual_whitening.learn(whitening, block.outputs - design @ model.values, block.follows)
         if (state.blocks + 1) % RENEWED == 0:
             residual_whitening.settle(whitening)

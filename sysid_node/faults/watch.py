@@ -22,9 +22,8 @@ from sysid_node.faults.hypotheses import servo_check as servos
 from sysid_node.faults.hypotheses.rate_limits import RateLimits
 from sysid_node.faults.hypotheses.servo_check import ServoCheckState
 from sysid_node.faults.hypotheses.servo_times import ServoTimes
-from sysid_node.faults.model import blocks, servo_follower
+from sysid_node.faults.model import blocks
 from sysid_node.faults.model.reference_model import IdentifierEstimates
-from sysid_node.faults.model.servo_follower import ServoFollower
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.state import MonitorState
 from sysid_node.faults.types import ARRIVAL, SILENT, Fault
@@ -46,7 +45,6 @@ class MessageWatch:
     state: MonitorState
     servos: ServoCheckState
     intake: AlignmentState
-    follower: ServoFollower
     limits: RateLimits
     stale_after: float  # s
     now: float = 0.0  # s, of the last sample
@@ -68,7 +66,7 @@ def init(aircraft: Aircraft, settings: FaultMonitorSettings, stale_after: float)
     taken = intake.init(aircraft, blocks.MOST_GAP)
     forces, positions = monitor.init(aircraft, settings), servos.init(aircraft, settings)
     limits = rate_limits.init(aircraft, forces.terms)
-    return MessageWatch(forces, positions, taken, servo_follower.init(aircraft), limits, stale_after)
+    return MessageWatch(forces, positions, taken, limits, stale_after)
 
 
 def on_imu(watch: MessageWatch, arrived: float, stamp_ns: int, values: tuple[float, ...]) -> None:
@@ -105,10 +103,8 @@ def on_command(watch: MessageWatch, stamp_ns: int, names: Sequence[str], positio
 
 def on_estimates(watch: MessageWatch, known: IdentifierEstimates) -> None:
     """Take the identifier's estimates of the last sample."""
-    monitor.receive_estimates(watch.state, watch.now, known.derivatives)
+    monitor.receive_estimates(watch.state, watch.now, known)
     servo_times.receive(watch.servo_times, watch.now, known.servos, known.changed)
-    if watch.state.alarm is None:
-        servo_follower.receive_estimates(watch.follower, watch.now, known.servos)
 
 
 def present_faults(watch: MessageWatch, now: float) -> list[Fault]:
@@ -153,8 +149,7 @@ def _take(watch: MessageWatch, samples: Sequence[AlignedSample]) -> None:
         watch.now, watch.stamp_ns = moment, intake.stamp_of(watch.intake, moment)
         count = watch.state.history.count
         rate_limits.move(watch.limits, moment, sample)
-        learning = watch.judged <= 0.0
-        monitor.update(watch.state, moment, servo_follower.deflected(watch.follower, moment, sample, learning=learning))
+        monitor.update(watch.state, moment, sample)
         if watch.state.history.count > count and watch.state.history.latest is not None:
             rate_limits.take(watch.limits, watch.state.history.latest, watch.state.whitening.filter)
 

@@ -15,6 +15,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults import monitor
 from sysid_node.faults.model.blocks import PERIOD, Block
+from sysid_node.faults.model.lagged_controls import LAGS
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.state import MonitorState
 from sysid_node.faults.types import Fault
@@ -42,6 +43,7 @@ class Maker:
     def __init__(self, seed: int, names: tuple[str, ...]) -> None:
         self.random = np.random.default_rng(seed)
         self.names = names
+        self.behind = len(AIRCRAFT.controls) * len(LAGS)
         self.count = 0
         self.noise = np.zeros(6)
         self.motion = dict.fromkeys(SIZES, 0.0)
@@ -65,7 +67,7 @@ class Maker:
             row[OFFSET if name == "0" else self.names.index(name)] = value
         row[:OUTPUTS] = outputs
         air = np.array([18.0, measured["alpha"], measured["beta"]])
-        return Block(PERIOD * self.count, outputs, row, air, 20, self.count > 1)
+        return Block(PERIOD * self.count, outputs, row, np.zeros(self.behind), air, 20, self.count > 1)
 
 
 def monitored(seed: int, **settings: float) -> tuple[MonitorState, Maker]:

@@ -10,7 +10,7 @@ from sysid_node.errors import InputError
 from sysid_node.faults import monitor
 from sysid_node.faults.model import blocks
 from sysid_node.faults.model.blocks import PERIOD
-from sysid_node.faults.model.reference_model import IdentifierEstimate
+from sysid_node.faults.model.reference_model import IdentifierEstimate, IdentifierEstimates
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VANE_OFFSET, VANE_STUCK
 
@@ -190,15 +190,15 @@ def test_the_last_good_derivatives_are_held() -> None:
     """What the identifier says is taken up ten seconds later, and nothing that comes after an alarm."""
     state, maker = flown(seed=9)
     place = state.terms.names.index("Cm_de")
-    monitor.receive_estimates(
-        state, ONSET, {"Cm_de": IdentifierEstimate(-0.47, 0.004, True), "CL_alpha": IdentifierEstimate(9.9, 0.1, False)}
-    )
+    known = {"Cm_de": IdentifierEstimate(-0.47, 0.004, True), "CL_alpha": IdentifierEstimate(9.9, 0.1, False)}
+    monitor.receive_estimates(state, ONSET, IdentifierEstimates(known, {}, False))
     fly(state, maker, 12.0)
     assert state.reference.values[place] == -0.47
     assert state.reference.errors[place] == 0.004
     assert state.reference.values[state.terms.names.index("CL_alpha")] == AIRCRAFT.derivatives["CL_alpha"].value
     fly(state, maker, 8.0, lost("de", 0.6))
-    monitor.receive_estimates(state, 60.0, {"Cm_de": IdentifierEstimate(-0.19, 0.004, True)})
+    known = {"Cm_de": IdentifierEstimate(-0.19, 0.004, True)}
+    monitor.receive_estimates(state, 60.0, IdentifierEstimates(known, {}, False))
     fly(state, maker, 12.0, lost("de", 0.6))
     assert state.reference.values[place] == -0.47
 
@@ -206,11 +206,8 @@ def test_the_last_good_derivatives_are_held() -> None:
 def test_estimates_that_are_ripe_as_soon_as_it_judges() -> None:
     """Their values differ from the file's as a sound aircraft's may: nothing is found, early or late."""
     state, maker = monitored(seed=10)
-    monitor.receive_estimates(
-        state,
-        1.0,
-        {"Cm_de": IdentifierEstimate(-0.4606 * 1.01, 0.01, True), "CL_alpha": IdentifierEstimate(3.02, 0.05, True)},
-    )
+    known = {"Cm_de": IdentifierEstimate(-0.465, 0.01, True), "CL_alpha": IdentifierEstimate(3.02, 0.05, True)}
+    monitor.receive_estimates(state, 1.0, IdentifierEstimates(known, {}, False))
     assert fly(state, maker, 60.0) is None
     assert state.reference.values[state.terms.names.index("CL_alpha")] == 3.02
 

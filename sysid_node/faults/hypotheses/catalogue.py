@@ -72,6 +72,8 @@ _STIFFNESS = (
 
 def _of_surface(name: str, symbol: str, limit: float, terms: Terms, reference: Array) -> list[Hypothesis]:
     lost = np.where(terms.of(symbol), -reference, 0.0)
+    servo, _ = terms.servos[name]
+    lost[servo] = -reference[servo]  # what the servo is behind by has lost its effect, too
     moved = _offsets(symbol, terms, reference)
     none = np.zeros_like(reference)
     return [

@@ -5,12 +5,13 @@ it is late by the command's size over twice the limit, so that large steps are l
 servo is. Two models of the control's main moment are compared by least squares on blocks of 0.1 s. Both have the
 aircraft's derivatives free:
 
-    M0: C = sum c_j x_j + (other terms),        x_j = the command through a lag T_j of first order, from none to 0.12 s
+    M0: C = sum c_j x_j + (other terms),        x_j = the command through lags of first order, one or more, or none
     M1: C = M0 + g D(R),                        D(R) = a servo's position with the rate limit R, less that without
 
-A sum of lags stands for any servo without a limit. With residual sums of squares S, twice the log likelihood ratio is
-n log(S0 / S1), for blocks whose residuals are whitened (see ``residual_whitening``). A limited surface has the effect
-g = sum c_j: what is merely correlated with D(R), such as a stall in a hard manoeuvre, has another.
+A sum of lags stands for any servo without a limit. Lags in series are among them, as a servo of second order begins to
+move more softly than a lag, and would otherwise look limited. With residual sums of squares S, twice the log likelihood
+ratio is n log(S0 / S1), for blocks whose residuals are whitened (see ``residual_whitening``). A limited surface has the
+effect g = sum c_j: what is merely correlated with D(R), such as a stall in a hard manoeuvre, has another.
 (Nested comparison: Seber & Lee, "Linear Regression Analysis", 2nd ed., 2003, ch. 4; rate limits as a cause of handling
 problems: Klyde & Mitchell, J. Guidance 27(5), 2004.)
 """
@@ -38,13 +39,15 @@ from sysid_node.online.types import SAMPLE_COLUMNS
 Array = NDArray[np.float64]
 
 LIMITS = 1.25 ** np.arange(0, 13)  # rad/s, from 1 to 14.6
-LAGS = (0.0, 0.02, 0.05, 0.12)  # s, whose sum is a servo
+#: Time constant (s), and which of the lags before it each one follows; none: the command. Their sum is a servo.
+LAGS = ((0.0, None), (0.02, None), (0.06, None), (0.02, 1), (0.02, 2))
 SERVO = 1  # of these, before the limit
 MEMORY = 120.0  # s, time constant with which blocks are forgotten
 SURE = 15.0  # log likelihood ratio above which a limit is reported, and
-MATTERS = 0.1  # ... per block: what is significant in a long flight may be a trifle that no model of a servo has right
+MATTERS = 0.2  # ... per block: misfits of servos and instruments in still air reach 0.14 in flights without a limit
 NEAR = 0.5  # largest difference of the free factor from the surface's effect, as a share
 LEAST_BLOCKS = 100
+LEAST_MOVES = 7.0  # blocks in which the surface is behind: in fewer, several shapes of a response fit
 EVERY = 50  # blocks between comparisons
 KNOWN_SHARE = 0.7  # of a limit that the file states: only a lower one is reported
 PROFILE = 1.92  # log likelihood under its maximum at the ends of a 95 % interval
@@ -88,6 +91,7 @@ class RateLimits:
     servos: _Servos
     rows: list[deque[Array]]  # by control, the last blocks before whitening
     grams: list[Array]
+    behind: Array  # (m, 2) sums of squares, and of their squares, of how far each surface is behind its command
     weight: float = 0.0  # blocks that count
     blocks: int = 0
     found: dict[str, Fault] = field(default_factory=dict)
@@ -100,9 +104,9 @@ class RateLimits:
 
 def init(aircraft: Aircraft, terms: Terms) -> RateLimits:
     """The state before the first sample."""
-    servos = servos_of(aircraft)[1:]
+    stated = servos_of(aircraft)[1:]
     controls = []
-    for place, ((name, control), servo) in enumerate(zip(aircraft.controls.items(), servos, strict=True)):
+    for place, ((name, control), servo) in enumerate(zip(aircraft.controls.items(), stated, strict=True)):
         mine = [
             d for d in np.flatnonzero(terms.of(control.symbol)) if COEFFICIENTS[terms.output[d]] in ("Cl", "Cm", "Cn")
         ]
@@ -115,7 +119,8 @@ def init(aircraft: Aircraft, terms: Terms) -> RateLimits:
     m, J, K = len(aircraft.controls), len(LAGS), LIMITS.size
     rows: list[deque[Array]] = [deque(maxlen=2) for _ in controls]
     grams = [np.zeros((n, n)) for n in (1 + c.others.size + J + K for c in controls)]
-    return RateLimits(tuple(controls), _Servos(m, np.zeros((m, K)), np.zeros((m, K))), rows, grams)
+    servos = _Servos(m, np.zeros((m, K)), np.zeros((m, K)))
+    return RateLimits(tuple(controls), servos, rows, grams, np.zeros((len(controls), 2)))
 
 
 def move(state: RateLimits, time: float, sample: Sequence[float]) -> None:
@@ -130,13 +135,16 @@ def move(state: RateLimits, time: float, sample: Sequence[float]) -> None:
         servos.areas = [[0.0] * len(LAGS) for _ in commands]
         servos.beyond[:], servos.area_beyond[:], servos.limiting = 0.0, 0.0, False
         return
-    decays = [math.exp(-step / lag) if lag else 0.0 for lag in LAGS]
+    decays = [math.exp(-step / lag) if lag else 0.0 for lag, _ in LAGS]
     before = [lagged[SERVO] for lagged in servos.lagged]
     for i, (earlier, now) in enumerate(zip(servos.commands, commands, strict=True)):
-        aim, lagged, areas = 0.5 * (earlier + now), servos.lagged[i], servos.areas[i]  # straight lines between samples
-        for j, decay in enumerate(decays):
+        lagged, areas = servos.lagged[i], servos.areas[i]
+        means: list[float] = []
+        for j, ((_, source), decay) in enumerate(zip(LAGS, decays, strict=True)):
+            aim = 0.5 * (earlier + now) if source is None else means[source]  # straight lines between samples
             after = aim + (lagged[j] - aim) * decay if decay else now
-            areas[j] += 0.5 * step * (lagged[j] + after)
+            means.append(0.5 * (lagged[j] + after))
+            areas[j] += step * means[j]
             lagged[j] = after
     servos.commands = commands
     moved = [lagged[SERVO] - old for lagged, old in zip(servos.lagged, before, strict=True)]
@@ -174,6 +182,8 @@ def take(state: RateLimits, block: Block, whitening: Array) -> None:
             white = row - whitening[0, control.output] * earlier[1] - whitening[1, control.output] * earlier[0]
             state.grams[i] *= keep
             state.grams[i] += white[:, None] * white
+            behind = float(white[1 + control.others.size] - white[1 + control.others.size + SERVO]) ** 2
+            state.behind[i] = keep * state.behind[i] + np.array([behind, behind**2])
         earlier.append(row)
         if state.blocks % EVERY == 0 and state.weight > LEAST_BLOCKS:
             _compare(state, i, block.time)
@@ -185,7 +195,14 @@ def _compare(state: RateLimits, i: int, now: float) -> None:
     best = int(np.argmax(ratios))
     lowest = KNOWN_SHARE * control.known if math.isfinite(control.known) else LIMITS[-1]
     needed = max(SURE, MATTERS * state.weight)
-    told = ratios[best] > needed and abs(factors[best] - 1.0) < NEAR and best > 0 and LIMITS[best] < lowest
+    squares, fourth = state.behind[i].tolist()
+    told = (
+        squares**2 > LEAST_MOVES * fourth
+        and ratios[best] > needed
+        and abs(factors[best] - 1.0) < NEAR
+        and best > 0
+        and LIMITS[best] < lowest
+    )
     if not told:
         if ratios[best] < 0.5 * needed:
             state.found.pop(control.name, None)

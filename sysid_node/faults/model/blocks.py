@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.faults.model import lagged_controls
+from sysid_node.faults.model.lagged_controls import LAGS, LaggedControls
 from sysid_node.online.frequency import regression_signals as signals
 from sysid_node.online.frequency.regression_signals import OFFSET, OUTPUTS, MomentumGain, ScalarSignals, SignalLayout
 from sysid_node.online.types import SAMPLE_COLUMNS
@@ -35,6 +37,7 @@ class Block(NamedTuple):
     time: float
     outputs: Array  # (6,) k C
     regressors: Array  # (W,) columns of the layout; k in column OFFSET
+    behind: Array  # (m J,) k times what the controls are behind through each lag, rad (see ``lagged_controls``)
     air: Array  # (3,) V m/s, alpha, beta rad, as measured
     samples: int
     follows: bool  # whether it begins at the end of the block before
@@ -47,7 +50,9 @@ class BlockAverager:
     layout: SignalLayout
     signals: ScalarSignals
     gain: MomentumGain
-    area: Array
+    lagged: LaggedControls
+    controls: slice  # where they are in a sample
+    area: Array  # of the layout's columns, then of ``behind``
     air: Array = field(default_factory=lambda: np.zeros(3))
     previous: tuple[float, Array, tuple[float, ...]] | None = None
     begin: float = math.nan  # s
@@ -57,9 +62,10 @@ class BlockAverager:
 
 def init(aircraft: Aircraft) -> BlockAverager:
     """The state before the first sample."""
-    layout = signals.layout(aircraft)
-    width = layout.width
-    return BlockAverager(layout, signals.scalar_signals(aircraft), signals.momentum_gain(aircraft), np.zeros(width))
+    layout, count = signals.layout(aircraft), len(aircraft.controls)
+    equations = signals.scalar_signals(aircraft), signals.momentum_gain(aircraft)
+    area = np.zeros(layout.width + count * len(LAGS))
+    return BlockAverager(layout, *equations, LaggedControls(count), _places(aircraft), area)
 
 
 def add(state: BlockAverager, time: float, sample: Sequence[float]) -> Block | None:
@@ -75,6 +81,7 @@ def add(state: BlockAverager, time: float, sample: Sequence[float]) -> Block | N
         return None
     row, angles = state.signals(values)
     row.insert(_DRIFT, 0.0)
+    row += [row[OFFSET] * off for off in state.lagged.follow(time, values[state.controls])]
     now = state.previous = (time, np.array(row), (*values[3:6], *angles))
     if before is None or time - before[0] > MOST_GAP:
         _begin(state, time, unbroken=False)
@@ -96,7 +103,9 @@ def of_record(aircraft: Aircraft, time: Array, samples: Array) -> list[Block]:
     time, values = time[usable], values[usable]
     rows, angles = signals.array_signals(aircraft)(list(values.T))
     rows.insert(_DRIFT, np.zeros_like(time))
-    row, motion = np.stack(rows, axis=1), [*values.T[3:6], *angles]
+    behind = lagged_controls.of_record(time, values[:, _places(aircraft)])
+    width, motion = len(rows), [*values.T[3:6], *angles]
+    row = np.column_stack([*rows, rows[OFFSET][:, None] * behind])
     steps = np.diff(time)
     area = 0.5 * steps[:, None] * (row[1:] + row[:-1])
     area[:, :OUTPUTS] += np.stack(signals.momentum_gain(aircraft)([m[:-1] for m in motion], [m[1:] for m in motion]), 1)
@@ -109,15 +118,22 @@ def of_record(aircraft: Aircraft, time: Array, samples: Array) -> list[Block]:
         elif time[last] - time[first] >= PERIOD - 1e-6:
             duration = time[last] - time[first]
             means, seen = (whole[last] - whole[first]) / duration, (air[last] - air[first]) / duration
-            found.append(Block(float(time[last]), means[:OUTPUTS], means, seen, last - first, unbroken))
+            parts = means[:OUTPUTS], means[:width], means[width:]
+            found.append(Block(float(time[last]), *parts, seen, last - first, unbroken))
             first, unbroken = last, True
     return found
 
 
+def _places(aircraft: Aircraft) -> slice:
+    """Where the controls are in a sample."""
+    return slice(len(SAMPLE_COLUMNS), len(SAMPLE_COLUMNS) + len(aircraft.controls))
+
+
 def _complete(state: BlockAverager, time: float) -> Block:
     duration = time - state.begin
-    means = state.area / duration
-    block = Block(time, means[:OUTPUTS], means, state.air / duration, state.samples, state.unbroken)
+    means, width = state.area / duration, state.layout.width
+    parts = means[:OUTPUTS], means[:width], means[width:]
+    block = Block(time, *parts, state.air / duration, state.samples, state.unbroken)
     _begin(state, time, unbroken=True)
     return block
 

@@ -37,7 +37,7 @@ def gust_covariance(reference: ReferenceModel, information: Array) -> Array:
     ``information`` (D, D) is the mean information of a block of the interval.
     """
     terms = reference.terms
-    slopes = np.flatnonzero(~terms.of("0") & (np.diag(reference.blocks) >= LEAST))
+    slopes = np.flatnonzero((terms.output >= 0) & ~terms.of("0") & (np.diag(reference.blocks) >= LEAST))
     if not slopes.size:
         return np.zeros_like(information)
     count = np.sqrt(np.maximum(np.diag(reference.blocks), 1.0))

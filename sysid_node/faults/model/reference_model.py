@@ -1,7 +1,8 @@
 """The reference model: the derivatives before a fault, and their covariance.
 
 The derivatives are at first those of the aircraft file, with its tolerances. Valid estimates of the identifier replace
-them when they are old enough not to include a fault that is found now. They are refined by least squares on the
+them when they are old enough not to include a fault that is found now. So do its estimates of how late each servo is,
+valid or not, as its standard error says how well that is known. They are refined by least squares on the
 whitened blocks since then, constrained to these values (modified sequential least squares: Ward, Monaco & Bodson, J.
 Guidance 21(6), 1998), corrected for the noise of the vanes (bias-compensated least squares: Soderstrom, Automatica 43,
 2007, sec. 5).
@@ -18,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sysid_node.faults.model.lagged_controls import shares_of
 from sysid_node.faults.model.residual_whitening import WhiteningFilter
 from sysid_node.faults.model.terms import Terms
 from sysid_node.online.types import DerivativeEstimate
@@ -69,7 +71,7 @@ class ReferenceModel:
     v: Array  # (D,) its score about the values
     blocks: Array  # (D, D) number of blocks in it
     offsets: Array = field(default_factory=lambda: np.zeros(6))  # of the coefficients, part of the model
-    pending: deque[tuple[float, Mapping[str, IdentifierEstimate]]] = field(default_factory=deque)
+    pending: deque[tuple[float, IdentifierEstimates]] = field(default_factory=deque)
 
 
 class ModelPrior(NamedTuple):
@@ -89,7 +91,7 @@ def init(terms: Terms) -> ReferenceModel:
     )
 
 
-def receive_estimates(reference: ReferenceModel, time: float, known: Mapping[str, IdentifierEstimate]) -> None:
+def receive_estimates(reference: ReferenceModel, time: float, known: IdentifierEstimates) -> None:
     """Take estimates at a time (s). One set each 10 s is kept until it is old enough."""
     if reference.pending and time < reference.pending[-1][0]:
         reference.pending.clear()  # the clock has stepped back
@@ -102,15 +104,26 @@ def adopt_estimates(reference: ReferenceModel, now: float) -> bool:
     taken = False
     while reference.pending and now - reference.pending[0][0] >= RIPE:
         _, known = reference.pending.popleft()
-        for d, name in enumerate(reference.terms.names):
-            one = known.get(name)
-            if one is not None and one.valid and math.isfinite(one.value + one.standard_error):
+        for name, one in known.derivatives.items():
+            if name in reference.terms.names and one.valid and math.isfinite(one.value + one.standard_error):
+                taken = True
+                d = reference.terms.names.index(name)
                 change = one.value - reference.values[d]
                 reference.offsets[reference.terms.output[d]] -= change * reference.regressors[d]
-                reference.v -= change * reference.J[:, d]
-                reference.values[d], reference.errors[d] = one.value, one.standard_error
+                _adopt(reference, d, one.value, one.standard_error)
+        for name, one in known.servos.items():
+            if name in reference.terms.servos and math.isfinite(one.value + one.standard_error):
                 taken = True
+                servo, _ = reference.terms.servos[name]
+                for d, share, error in zip(servo, *shares_of(one.value, one.standard_error), strict=True):
+                    _adopt(reference, int(d), float(share), float(error))
     return taken
+
+
+def _adopt(reference: ReferenceModel, d: int, value: float, error: float) -> None:
+    """Put another value with its standard error in the place of a term's."""
+    reference.v -= (value - reference.values[d]) * reference.J[:, d]
+    reference.values[d], reference.errors[d] = value, error
 
 
 def learn(reference: ReferenceModel, J: Array, v: Array, chosen: NDArray[np.bool_]) -> None:
@@ -146,7 +159,7 @@ def model_prior(reference: ReferenceModel, noise: Array, slack: float) -> ModelP
     shift = axes @ np.where(learned, axes.T @ (reference.v + noise @ values) / (1.0 + size), 0.0)
     values = values + shift
     loose = (slack * values) ** 2
-    for output in set(terms.output.tolist()):
+    for output in terms.coefficients:
         mine = terms.output == output
         d = terms.offset_of(output)
         # offsets are learned separately, for the reference values: a shift of the others must not change the mean
@@ -164,7 +177,7 @@ def _covariance(reference: ReferenceModel) -> Array:
     """
     terms, errors = reference.terms, np.maximum(reference.errors, 1e-9)
     found = np.diag(errors**2)
-    for output in set(terms.output.tolist()):
+    for output in terms.coefficients:
         mine = (terms.output == output) & (terms.signal < 1.0)
         share = float(np.median(errors[mine] / np.maximum(np.abs(reference.values[mine]), 1e-9))) if mine.any() else 0.0
         common = np.where(terms.output == output, min(share, 1.0) * reference.values, 0.0)
@@ -175,6 +188,6 @@ def _covariance(reference: ReferenceModel) -> Array:
 def whole(reference: ReferenceModel, shift: Array) -> Array:
     """(D,) the values with a ``shift`` and with the learned offsets."""
     values = np.asarray(reference.values + shift)
-    for output in set(reference.terms.output.tolist()):
+    for output in reference.terms.coefficients:
         values[reference.terms.offset_of(output)] += reference.offsets[output]
     return values

@@ -1,0 +1,38 @@
+"""Commands alone, servos of which the aircraft file says nothing: the truth is what was flown."""
+
+from pathlib import Path
+
+import pytest
+
+from sysid_node import load, replay
+from sysid_node.cli.main import main
+from sysid_node.faults.recorded_flight import FaultVerdict
+from sysid_node.faults.types import LOSS
+
+LATE = "actuator_lag:time_constant=0.1"  # s
+
+
+def verdict_on(bag: Path, *flown: str) -> FaultVerdict:
+    """What the replay of a simulated flight says of faults, as ``sysid replay`` does."""
+    words = ["simulate", "--aircraft", "cdrw", "--seed", "1", "--effect", LATE, "--quiet", "--out", str(bag), *flown]
+    assert main(words) == 0
+    found = replay(load(bag, "cdrw")).faults
+    assert found is not None
+    return found
+
+
+def test_servos_that_are_not_known_are_no_damage(tmp_path: Path) -> None:
+    """The identifier knows their times only at the end of what the monitor has learned from."""
+    verdict = verdict_on(tmp_path / "flight", "--manoeuvre", "3211:repeat=2")
+    assert verdict.judged > 10.0
+    assert not verdict.episodes, verdict.sentences
+
+
+def test_half_of_an_elevator_is_found_beside_them(tmp_path: Path) -> None:
+    lost = "control_effectiveness_loss:elevator=0.5:onset=42"
+    verdict = verdict_on(tmp_path / "flight", "--manoeuvre", "3211:repeat=4", "--effect", lost)
+    (episode,) = verdict.episodes
+    fault = episode.fault
+    assert (fault.kind, fault.part) == (LOSS, "elevator")
+    assert fault.lower <= 0.5 <= fault.upper
+    assert fault.found == pytest.approx(47.0, abs=6.0)
