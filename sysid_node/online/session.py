@@ -75,6 +75,11 @@ class Session:
         return self.state.inputs.force.fault
 
     @property
+    def unchanging(self) -> str:
+        """Which readings stand still, in words; empty where none does."""
+        return self.state.inputs.unchanging.fault
+
+    @property
     def silence(self) -> float:
         """Seconds since the last sample, on a clock that never jumps."""
         return time.monotonic() - self._heard

@@ -236,7 +236,8 @@ class Identifier(CarefulNode):
         )
         monitors, rejected = list(self._monitors.values()), session.rejected
         recent = self._recent.update(monitors, rejected)
-        message.status.append(source.input(monitors, rejected, stale_after, recent, session.force_fault))
+        readings = session.force_fault, session.unchanging
+        message.status.append(source.input(monitors, rejected, stale_after, recent, readings))
         self._warn(session, monitors, recent)
         if not session.samples:
             message.status += [source.waits("estimate"), source.waits("computation")]
@@ -273,6 +274,8 @@ class Identifier(CarefulNode):
             present[here] += f"; expected joints {', '.join(joints)}, got {', '.join(self._joints)}"
         if session.force_fault:
             present["accelerometer"] = session.force_fault
+        if session.unchanging:
+            present["readings"] = session.unchanging
         if session.samples and lag_level(self._lag) != DiagnosticStatus.OK:
             present["estimates"] = lag_words(self._lag)
         say(self, self._conditions.update(present))

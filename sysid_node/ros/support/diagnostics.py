@@ -37,11 +37,11 @@ class DiagnosticSource:
         rejected: Mapping[str, int],
         stale_after: float,
         recent: Sequence[RecentTopic] = (),
-        force_fault: str = "",
+        wrong_readings: Sequence[str] = (),
     ) -> DiagnosticStatus:
         """Rates, silence beyond ``stale_after`` s, and rejected messages (``"<topic>: <reason>"`` -> count).
 
-        ``force_fault``: what is wrong with the mean specific force, in words.
+        ``wrong_readings``: what is wrong with the mean specific force and other readings, in words.
 
         The level is that of the ``recent`` messages: ERROR where as good as all of a topic are rejected, WARN where
         more than a few are.
@@ -60,9 +60,10 @@ class DiagnosticSource:
         ]
         wrong = rejections(recent, {t.name: t.resolved for t in topics if t.resolved})
         faults += [f"{name}: {text}" for name, text in wrong.items()]
-        faults += [force_fault] if force_fault else []
+        unlikely = [words for words in wrong_readings if words]
+        faults += unlikely
         worst = max((topic.share for topic in recent if topic.rejected), default=0.0)
-        level = STALE if silent else ERROR if worst >= ALL or force_fault else WARN if worst > FEW else OK
+        level = STALE if silent else ERROR if worst >= ALL or unlikely else WARN if worst > FEW else OK
         return self._status("input", level, "; ".join(faults) or "all topics arrive", values)
 
     def waits(self, part: str) -> DiagnosticStatus:

@@ -73,6 +73,12 @@ def test_what_was_rejected_at_the_start_is_forgotten_after_ten_seconds() -> None
     assert levels[12:] == [OK, OK, OK]
 
 
+def test_unlikely_readings_are_an_error() -> None:
+    status = SOURCE.input([], {}, 0.5, wrong_readings=("", "sideslip: no change for 10 s"))
+    assert (status.level, status.message) == (ERROR, "sideslip: no change for 10 s")
+    assert SOURCE.input([], {}, 0.5, wrong_readings=("", "")).level == OK
+
+
 @pytest.mark.parametrize(("lag", "level"), [(0.02, OK), (0.8, WARN), (4.0, ERROR), (-1.0, WARN), (1e8, OK)])
 def test_lateness_has_a_level(lag: float, level: bytes) -> None:
     """It said OK at 4 s."""
