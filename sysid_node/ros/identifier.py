@@ -42,8 +42,9 @@ from sysid_node.ros.support.aircraft import aircraft_of
 from sysid_node.ros.support.declaring import declare, refusal, values_of
 from sysid_node.ros.support.diagnostics import DiagnosticSource, lag_level, lag_words, rejections
 from sysid_node.ros.support.lifecycle import CarefulNode
-from sysid_node.ros.support.loop_node import LAST_QOS, SENSOR_QOS, UNHEARD, expected_joints, full_name, say
+from sysid_node.ros.support.loop_node import LAST_QOS, SENSOR_QOS, expected_joints, full_name, say, waiting
 from sysid_node.ros.support.message_types import fields_of
+from sysid_node.ros.support.silence import UNHEARD, ClockWatch
 from sysid_node.ros.support.spin import run_node, while_ros_is_up
 
 DIAGNOSTICS = 1.0  # s between diagnostics
@@ -66,6 +67,7 @@ class Identifier(CarefulNode):
         declare(self, PARAMETERS, check)
         self.add_on_set_parameters_callback(self._on_parameters)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._clock_watch = ClockWatch(self)
         self._reported = -math.inf  # s, time.monotonic of the last diagnostics
         # A steady clock: diagnostics continue while simulated time stands still.
         self.create_timer(TICK, while_ros_is_up(self, self._on_tick), clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -262,9 +264,9 @@ class Identifier(CarefulNode):
 
     def _warn(self, session: Session, monitors: Sequence[TopicMonitor], recent: Sequence[RecentTopic]) -> None:
         """Say in the log which inputs are silent, rejected or late."""
-        present = {
-            monitor.resolved: f"no message for {monitor.waited():.1f} s" if monitor.received else "no message yet"
-            for monitor in monitors
+        present = self._clock_watch.missing() | {
+            monitor.resolved: waiting(self, monitor, subscription)
+            for monitor, subscription in zip(monitors, self._inputs, strict=True)
             if monitor.waited() > UNHEARD
         }
         present |= rejections([t for t in recent if t.share > FEW], {m.name: m.resolved for m in monitors})
