@@ -238,8 +238,8 @@ class Identifier(CarefulNode):
         )
         monitors, rejected = list(self._monitors.values()), session.rejected
         recent = self._recent.update(monitors, rejected)
-        readings = session.force_fault, session.unchanging
-        message.status.append(source.input(monitors, rejected, stale_after, recent, readings))
+        readings, max_gap = (session.force_fault, session.unchanging), session.settings.max_gap
+        message.status.append(source.input(monitors, rejected, stale_after, recent, readings, max_gap))
         self._warn(session, monitors, recent)
         if not session.samples:
             message.status += [source.waits("estimate"), source.waits("computation")]
@@ -269,7 +269,8 @@ class Identifier(CarefulNode):
             for monitor, subscription in zip(monitors, self._inputs, strict=True)
             if monitor.waited() > UNHEARD
         }
-        present |= rejections([t for t in recent if t.share > FEW], {m.name: m.resolved for m in monitors})
+        names = {monitor.name: monitor.resolved for monitor in monitors}
+        present |= rejections([t for t in recent if t.share > FEW], names, session.settings.max_gap)
         joints, here = expected_joints(session.aircraft), self._monitors[ACTUATORS].resolved
         missing = [joint for joint in joints if joint not in self._joints]
         if missing and here in present and self._joints:

@@ -73,6 +73,24 @@ def test_what_was_rejected_at_the_start_is_forgotten_after_ten_seconds() -> None
     assert levels[12:] == [OK, OK, OK]
 
 
+@pytest.mark.parametrize(
+    ("reason", "remedy"),
+    [
+        ("air_data gap", ": /uav1/air_data must come at least every 0.2 s (max_gap), stamped by the same clock"),
+        ("x", ""),
+    ],
+)
+def test_gaps_in_another_topic_are_said_with_what_to_do(reason: str, remedy: str) -> None:
+    topics = [TopicMonitor("imu/data", resolved="/uav1/imu/data"), TopicMonitor("air_data", resolved="/uav1/air_data")]
+    for _ in range(10):
+        topics[0].arrived()
+        topics[1].arrived()
+    recent = RecentCounts()
+    lately = recent.update(topics, {f"imu/data: {reason}": 10})
+    status = SOURCE.input(topics, {}, 60.0, lately, max_gap=0.2)
+    assert status.message == f"/uav1/imu/data: all of 10 messages rejected, most as {reason}{remedy}"
+
+
 def test_unlikely_readings_are_an_error() -> None:
     status = SOURCE.input([], {}, 0.5, wrong_readings=("", "sideslip: no change for 10 s"))
     assert (status.level, status.message) == (ERROR, "sideslip: no change for 10 s")
