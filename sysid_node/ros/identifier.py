@@ -239,7 +239,9 @@ class Identifier(CarefulNode):
         monitors, rejected = list(self._monitors.values()), session.rejected
         recent = self._recent.update(monitors, rejected)
         readings, max_gap = (session.force_fault, session.unchanging), session.settings.max_gap
-        message.status.append(source.input(monitors, rejected, stale_after, recent, readings, max_gap))
+        message.status.append(
+            source.input(monitors, rejected, stale_after, recent, readings, max_gap, session.lift_fault)
+        )
         self._warn(session, monitors, recent)
         if not session.samples:
             message.status += [source.waits("estimate"), source.waits("computation")]
@@ -279,6 +281,8 @@ class Identifier(CarefulNode):
             present["accelerometer"] = session.force_fault
         if session.unchanging:
             present["readings"] = session.unchanging
+        if session.lift_fault:
+            present["lift"] = session.lift_fault
         if session.samples and lag_level(self._lag) != DiagnosticStatus.OK:
             present["estimates"] = lag_words(self._lag)
         say(self, self._conditions.update(present))

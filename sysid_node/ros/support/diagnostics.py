@@ -40,11 +40,12 @@ class DiagnosticSource:
         recent: Sequence[RecentTopic] = (),
         wrong_readings: Sequence[str] = (),
         max_gap: float = 0.0,
+        doubt: str = "",
     ) -> DiagnosticStatus:
         """Rates, silence beyond ``stale_after`` s, and rejected messages (``"<topic>: <reason>"`` -> count).
 
         ``wrong_readings``: what is wrong with the mean specific force and other readings, in words.
-        ``max_gap``: see ``rejections``.
+        ``max_gap``: see ``rejections``. ``doubt``: what may be wrong, which is a warning.
 
         The level is that of the ``recent`` messages: ERROR where as good as all of a topic are rejected, WARN where
         more than a few are.
@@ -64,9 +65,9 @@ class DiagnosticSource:
         wrong = rejections(recent, {t.name: t.resolved for t in topics if t.resolved}, max_gap)
         faults += [f"{name}: {text}" for name, text in wrong.items()]
         unlikely = [words for words in wrong_readings if words]
-        faults += unlikely
+        faults += [*unlikely, *filter(None, [doubt])]
         worst = max((topic.share for topic in recent if topic.rejected), default=0.0)
-        level = STALE if silent else ERROR if worst >= ALL or unlikely else WARN if worst > FEW else OK
+        level = STALE if silent else ERROR if worst >= ALL or unlikely else WARN if worst > FEW or doubt else OK
         return self._status("input", level, "; ".join(faults) or "all topics arrive", values)
 
     def waits(self, part: str) -> DiagnosticStatus:

@@ -97,6 +97,11 @@ def test_unlikely_readings_are_an_error() -> None:
     assert SOURCE.input([], {}, 0.5, wrong_readings=("", "")).level == OK
 
 
+def test_what_may_be_wrong_is_a_warning() -> None:
+    status = SOURCE.input([], {}, 0.5, doubt="is the airspeed in m/s?")
+    assert (status.level, status.message) == (WARN, "is the airspeed in m/s?")
+
+
 @pytest.mark.parametrize(("lag", "level"), [(0.02, OK), (0.8, WARN), (4.0, ERROR), (-1.0, WARN), (1e8, OK)])
 def test_lateness_has_a_level(lag: float, level: bytes) -> None:
     """It said OK at 4 s."""
