@@ -130,9 +130,17 @@ class Exciter(LoopNode):
         estimates = conversion.estimates_from_message(message, 0)
         known = {n: d for n, d in estimates.derivatives.items() if n in self.aircraft.derivatives}
         precision = relative_precision(known.values(), self.aircraft)
-        if exciter.receive_estimates(self._state, self._now, precision) and self._reset.service_is_ready():
-            self._reset.call_async(Trigger.Request())
+        if exciter.receive_estimates(self._state, self._now, precision):
+            self._reset_estimates()
         self._log_events()
+
+    def _reset_estimates(self) -> None:
+        """Ask the identifier to begin anew, and say so where nobody can be asked."""
+        if self._reset.service_is_ready():
+            self._reset.call_async(Trigger.Request())
+        else:
+            name = self.resolve_service_name("identifier/reset")
+            self.get_logger().warning(f"{name}: nobody offers this service; old estimates go on beside the new flight")
 
     def _on_faults(self, message: Any) -> None:
         """Faults of surfaces and of the airframe; those of sensors are no reason to move the surfaces."""

@@ -12,7 +12,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
-from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -106,6 +106,12 @@ class Identifier(CarefulNode):
         self.get_logger().info(f"identifies {aircraft.name!r}: {', '.join(aircraft.model_structure)}")
         if not_taken := not_taken_in_words(aircraft):
             self.get_logger().warning(not_taken)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Listen; what came while the node did not is no silence."""
+        for monitor in self._monitors.values():
+            monitor.begin()
+        return super().on_activate(state)
 
     def cleanup(self) -> None:
         """Destroy what ``configure`` made, even where it did not finish."""

@@ -5,11 +5,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Quaternion, Vector3
 from harness import START_NS, Probe, ended, start
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
+from sysid_msgs.msg import DerivativeEstimates
 
+from sysid_node.faults.types import LOSS
 from sysid_node.ros.support import conversion
 
 HOUR = 3600 * 10**9
@@ -57,6 +60,26 @@ def test_excitation_goes_on_where_the_clock_is_set(probe: Probe) -> None:
                 flyer.until(lambda wanted=count: len(flyer.excitation) > wanted)
             moved = np.array([message.position for message in flyer.excitation])
             assert (np.ptp(moved, axis=0) > 0.002).all(), leap
+
+
+def test_estimates_that_nobody_can_begin_anew_are_said(probe: Probe) -> None:
+    """After a fault the estimates have to begin anew, for which the identifier has a service."""
+    flyer = Flyer(probe)
+    said: list[str] = []
+    estimates = probe.node.create_publisher(DerivativeEstimates, "identifier/derivatives", 10)
+    faults = probe.node.create_publisher(DiagnosticArray, "fault_monitor/faults", 10)
+    values = [KeyValue(key="part", value="elevator"), KeyValue(key="kind", value=LOSS)]
+    with ended(start("exciter", "--ros-args", "-p", "aircraft:=cdrw", "-p", "watch:=true"), said):
+        flyer.until(lambda: flyer.start.service_is_ready() and faults.get_subscription_count())
+        assert flyer.ask_to_start().success
+        flyer.until(lambda: any(np.any(message.position) for message in flyer.excitation))
+        faults.publish(DiagnosticArray(status=[DiagnosticStatus(values=values)]))
+        begun = flyer.stamp
+        for later in range(1, 12):
+            flyer.until(lambda wanted=begun + later * 200_000_000: flyer.stamp > wanted)
+            estimates.publish(DerivativeEstimates(header=conversion.header(flyer.stamp, ""), aircraft="cdrw"))
+    assert "estimates begun anew" in said[0]
+    assert said[0].count("/identifier/reset: nobody offers this service") == 1
 
 
 def test_it_refuses_to_begin_what_it_would_abort(probe: Probe) -> None:
