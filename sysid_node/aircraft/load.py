@@ -24,6 +24,7 @@ from sysid_node.aircraft.reading.quantities import Quantities, positive
 from sysid_node.aircraft.reading.tables import read_tables
 from sysid_node.errors import InputError
 from sysid_node.suggestion import did_you_mean
+from sysid_node.user_path import user_path
 
 _REQUIRED = {
     "name": "the aircraft's name",
@@ -100,7 +101,7 @@ def aircraft_folders() -> list[Path]:
 def _find(name_or_path: str | Path) -> Path:
     name = str(name_or_path)
     if isinstance(name_or_path, Path) or name.endswith((".yaml", ".yml")) or os.sep in name:
-        return Path(name_or_path)
+        return user_path(name_or_path)
     return _shipped(name)
 
 

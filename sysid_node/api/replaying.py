@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.stated_effects import as_estimated, not_taken_in_words
 from sysid_node.api.estimated_run import EstimatedRun
 from sysid_node.api.flight_file import FlightFile
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.faults.model.reference_model import identifier_estimates
 from sysid_node.faults.recorded_flight import FaultVerdict, RecordedEstimates, RecordedMonitor
 from sysid_node.faults.settings import FaultMonitorSettings as FaultSettings
@@ -250,6 +251,8 @@ class _Run:
             raise InputError(why_nothing_aligned(self.flight.name, self.spans, rejected))
         estimator.complete(self.state)  # no further sample gives it time
         final = estimate(self.state, last)
+        if still := self.state.inputs.unchanging.fault:
+            warnings.warn(f"{self.flight.name}: {still}", InputWarning, stacklevel=2)
         seconds = last - self.began
         if seconds < FIRST_ESTIMATE and not any(math.isfinite(d.value) for d in final.derivatives.values()):
             raise InputError(too_short_to_replay(self.flight.name, seconds))

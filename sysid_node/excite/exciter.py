@@ -35,6 +35,7 @@ INVALID_TIME = 0.5  # s for which a derivative must be invalid before excitation
 LOST_TIME = 2.0  # s for which it must be, while excitation is under way, before the estimates are reset
 LEAST_BETWEEN_RESETS = 15.0  # s, so that estimates have the time to become valid
 EVENTS = 1000  # number of events that are kept
+UNDER_WAY = "excitation is under way"
 
 
 class LimitedQuantities(NamedTuple):
@@ -107,10 +108,16 @@ def init(aircraft: Aircraft, settings: ExcitationSettings) -> ExciterState:
     return ExciterState(aircraft, settings, table, EstimateWatch(settings.derivatives))
 
 
-def start(state: ExciterState, time: float) -> None:
-    """Begins excitation at a time (s). Raises InputError where it is under way already."""
+def start(state: ExciterState, time: float, flight: LimitedQuantities | None = None) -> None:
+    """Begins excitation at a time (s).
+
+    Raises InputError where it is under way already, or would be aborted at once, as the ``flight`` exceeds a limit.
+    """
     if state.active:
-        raise InputError("excitation is under way; stop it first")
+        raise InputError(f"{UNDER_WAY}; stop it first")
+    exceeded = _exceeded_limit(state, flight) if flight is not None else ""
+    if exceeded:
+        raise InputError(f"{exceeded}: excitation would be aborted at once")
     state.begun, state.armed, state.watching = time, state.settings.watch, state.settings.watch
     _log(state, time, "begun")
 

@@ -356,4 +356,7 @@ def why_nothing_aligned(
         return f"{name}: the header stamps do not overlap: {intervals}; stamp all topics with one clock"
     worst = sorted(counts_by_reason(rejected).items(), key=lambda item: -item[1])[:3]
     reasons = "; ".join(f"{count} x {reason}" for reason, count in worst) or "fewer than two IMU messages"
-    return f"{name}: no two samples could be aligned: {reasons}; correct the messages or the aircraft file"
+    rare = [topic for topic in (AIR_DATA, ACTUATORS) if worst and worst[0][0] == f"{IMU}: {gap(topic)}"]
+    usual = "correct the messages or the aircraft file"
+    remedy = f"{rare[0]} must come more often, or max_gap be longer" if rare else usual
+    return f"{name}: no two samples could be aligned: {reasons}; {remedy}"

@@ -170,7 +170,7 @@ def begin_with_commands(state: EstimatorState, time: float) -> EstimatorState:
     if fresh.controls.states is not None:
         fresh.inputs.begin = max(state.inputs.begin, time + SERVOS_SETTLE)
     fresh.inputs.thrust_known, fresh.inputs.incomplete = state.inputs.thrust_known, state.inputs.incomplete
-    fresh.inputs.force = state.inputs.force
+    fresh.inputs.force, fresh.inputs.unchanging = state.inputs.force, state.inputs.unchanging
     return fresh
 
 
@@ -215,6 +215,7 @@ def _append(state: EstimatorState, time: float, sample: Sequence[float], excess:
     """Append a complete sample to the transform; after a gap, begin a segment with it."""
     model, inputs, previous = state.model, state.inputs, state.inputs.previous
     inputs.force.add(time, sample[AZ])
+    inputs.unchanging.add(time, sample)
     row, angles = model.sample.signals(sample)
     row.insert(DRIFT, time)
     motion = (*sample[3:6], *angles)

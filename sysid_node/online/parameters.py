@@ -40,7 +40,7 @@ PARAMETERS = (
         "save_directory",
         ".",
         "",
-        "Folder that ~/save writes estimates into; made where it is missing. May change at any time.",
+        "Folder that ~/save writes estimates into (~ is the home); made where it is missing. May change at any time.",
         "To keep estimates where they survive the flight.",
     ),
     NodeParameter(

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Sequence
+from operator import itemgetter
 from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import counts_by_reason
 from sysid_node.flight.commanded import carried_in_words
+from sysid_node.flight.live.mean_lift import RecentMeanLift
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.online import estimator
 from sysid_node.online.alignment import schedule, streaming
@@ -19,8 +21,9 @@ from sysid_node.online.estimates.model_gap import CoefficientGap, model_gap
 from sysid_node.online.estimates.published import estimate_of
 from sysid_node.online.estimates.servo_gap import ServoGap, servo_gaps, servo_times_in_file
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.types import Estimates
+from sysid_node.online.types import LIFT, Estimates
 
+_of_lift = itemgetter(*LIFT)
 BUSY = 0.4  # share of the time between estimates in which nothing long is begun before the next
 
 
@@ -48,6 +51,7 @@ class Session:
         self.state = estimator.init(self.aircraft, self.settings)
         self.intake = streaming.init(self.aircraft, self.settings.max_gap, self.settings.actuators)
         self.schedule = schedule.Schedule(self.publish_rate)
+        self.lift = RecentMeanLift(self.aircraft)
         self.samples = 0
         self._correlated: object = None  # the slowly changing quantities whose covariance was asked for last
         self._heard = time.monotonic()
@@ -73,6 +77,16 @@ class Session:
     def force_fault(self) -> str:
         """What is wrong with the mean specific force of the last seconds, in words; empty where nothing is."""
         return self.state.inputs.force.fault
+
+    @property
+    def unchanging(self) -> str:
+        """Which readings stand still, in words; empty where none does."""
+        return self.state.inputs.unchanging.fault
+
+    @property
+    def lift_fault(self) -> str:
+        """What does not go together of weight, airspeed and angle of attack, in words; empty where nothing is wrong."""
+        return "" if self.force_fault else self.lift.fault
 
     @property
     def silence(self) -> float:
@@ -139,6 +153,7 @@ class Session:
             estimator.update(self.state, moment, sample)
             self.update_times.add(time.perf_counter() - start)
             self.samples += 1
+            self.lift.add(moment, *_of_lift(sample))
             self._heard = time.monotonic()
             if schedule.due(self.schedule, moment, wait):
                 results.append(self.now())

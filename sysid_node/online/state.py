@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.live.mean_force import RecentMeanForce
+from sysid_node.flight.live.unchanging import UnchangingReadings
 from sysid_node.online.alignment.flow_angle_filter import FlowAngleFilter
 from sysid_node.online.changes.detection import ChangeMonitor
 from sysid_node.online.changes.excited_segments import ExcitedSegments
@@ -225,6 +226,7 @@ class EstimatorInputs:
     incomplete: dict[str, int] = field(default_factory=dict)  # samples left out, by the column that was missing
     thrust_known: bool | None = None  # whether the first sample had one; None = none has come yet
     force: RecentMeanForce = field(default_factory=RecentMeanForce)  # specific force along z
+    unchanging: UnchangingReadings = field(default_factory=UnchangingReadings)
 
 
 @dataclass(frozen=True)

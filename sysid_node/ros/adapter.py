@@ -40,7 +40,8 @@ from sysid_node.parameter import NodeParameter, annotated_yaml, check_each
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.declaring import declare, values_of
 from sysid_node.ros.support.diagnostics import DiagnosticSource
-from sysid_node.ros.support.loop_node import UNHEARD, full_name, say
+from sysid_node.ros.support.loop_node import full_name, say, waiting
+from sysid_node.ros.support.silence import UNHEARD, ClockWatch
 from sysid_node.ros.support.spin import run_node, while_ros_is_up
 
 #: Autopilots' bridges publish best effort. The queue is deep enough for a burst after a pause of the process.
@@ -105,14 +106,15 @@ class AdapterNode(Node):
             AirSample: (self.create_publisher(AirData, AIR_DATA, 100), air_message),
             JointSample: (self.create_publisher(JointState, ACTUATORS, 100), joint_message),
         }
-        self._conditions = Conditions()
+        self._conditions, self._clock_watch = Conditions(), ClockWatch(self)
         self._left_out: Counter[str] = Counter()  # messages since the last report, by resolved topic
-        self._monitors = [self._listen(kind, topic) for topic, kind in kinds.items()]
+        self._heard = [self._listen(kind, topic) for topic, kind in kinds.items()]
+        self._monitors = [monitor for monitor, _ in self._heard]
         self.add_on_set_parameters_callback(_refuse)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_timer(1.0, while_ros_is_up(self, self._on_tick), clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def _listen(self, kind: Any, topic: str) -> TopicMonitor:
+    def _listen(self, kind: Any, topic: str) -> tuple[TopicMonitor, Any]:
         monitor = TopicMonitor(topic)
         subscription = self.create_subscription(kind, topic, while_ros_is_up(self, self._on(topic, monitor)), INPUT_QOS)
         monitor.name = subscription.topic_name
@@ -121,7 +123,7 @@ class AdapterNode(Node):
                 f"topic {subscription.topic_name} is both the autopilot's and the adapter's: start the adapter and the "
                 "identifier in a namespace, e.g. --ros-args -r __ns:=/sysid"
             )
-        return monitor
+        return monitor, subscription
 
     def _on(self, topic: str, monitor: TopicMonitor) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
@@ -139,9 +141,9 @@ class AdapterNode(Node):
         return receive
 
     def _on_tick(self) -> None:
-        present = {
-            monitor.name: f"no message for {monitor.waited():.1f} s" if monitor.received else "no message yet"
-            for monitor in self._monitors
+        present = self._clock_watch.missing() | {
+            monitor.name: waiting(self, monitor, subscription)
+            for monitor, subscription in self._heard
             if monitor.waited() > UNHEARD
         }
         late = {name: f"{count} messages are {TOO_LATE}" for name, count in self._left_out.items()}

@@ -22,6 +22,7 @@ from sysid_node.excite.exciter_settings import RANGES, ExcitationSettings
 from sysid_node.excite.relative_precision import relative_precision
 from sysid_node.faults.types import DAMAGE, HARD_OVER, LOSS, NOT_FOLLOWING, SHIFTED, STUCK
 from sysid_node.flight.live import messages
+from sysid_node.flight.live.flight_time import FlightTime
 from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
 from sysid_node.flight.topics import AIR_DATA, IMU
 from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, setting
@@ -87,7 +88,7 @@ class Exciter(LoopNode):
         self._state = exciter.init(self.aircraft, ExcitationSettings(**settings))
         self._inertial, self._air = (-math.inf, (math.nan,) * 3), (-math.inf, math.nan)
         self._logged = 0
-        self._start_ns, self._now = 0, 0.0  # s of the IMU's stamps, from the first
+        self._time = FlightTime()  # by the IMU's stamps
         self._excitation = self.create_publisher(JointState, EXCITATION, 10)
         self._reset = self.create_client(Trigger, "identifier/reset")
         self.listen(Imu, IMU, ATTITUDE_PATHS, self._on_imu, LATEST)
@@ -97,6 +98,11 @@ class Exciter(LoopNode):
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/stop", self._on_stop)
         self.every(PERIOD, self._on_time)
+
+    @property
+    def _now(self) -> float:
+        """The time of flight, s."""
+        return self._time.seconds
 
     def words(self) -> tuple[bytes, str, Mapping[str, object]]:
         """Whether it excites, and its last event."""
@@ -112,9 +118,8 @@ class Exciter(LoopNode):
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:
         stamp, values, attitude = messages.imu_and_attitude(numbers, self.values["body_frame"])
-        self._inertial = time.monotonic(), (*attitude, -values[2] / GRAVITY)
-        self._start_ns = self._start_ns or stamp
-        self._now = (stamp - self._start_ns) / conversion.NANOSECONDS
+        if self._time.arrived(stamp):
+            self._inertial = time.monotonic(), (*attitude, -values[2] / GRAVITY)
 
     def _on_air_data(self, numbers: Numbers, _: Texts) -> None:
         self._air = time.monotonic(), messages.air_data(numbers)[1][0]
@@ -125,9 +130,17 @@ class Exciter(LoopNode):
         estimates = conversion.estimates_from_message(message, 0)
         known = {n: d for n, d in estimates.derivatives.items() if n in self.aircraft.derivatives}
         precision = relative_precision(known.values(), self.aircraft)
-        if exciter.receive_estimates(self._state, self._now, precision) and self._reset.service_is_ready():
-            self._reset.call_async(Trigger.Request())
+        if exciter.receive_estimates(self._state, self._now, precision):
+            self._reset_estimates()
         self._log_events()
+
+    def _reset_estimates(self) -> None:
+        """Ask the identifier to begin anew, and say so where nobody can be asked."""
+        if self._reset.service_is_ready():
+            self._reset.call_async(Trigger.Request())
+        else:
+            name = self.resolve_service_name("identifier/reset")
+            self.get_logger().warning(f"{name}: nobody offers this service; old estimates go on beside the new flight")
 
     def _on_faults(self, message: Any) -> None:
         """Faults of surfaces and of the airframe; those of sensors are no reason to move the surfaces."""
@@ -137,20 +150,24 @@ class Exciter(LoopNode):
         self._log_events()
 
     def _on_time(self) -> None:
+        moved = exciter.step(self._state, self._now, self._limited())
+        stamp = self.get_clock().now().nanoseconds
+        self._excitation.publish(named(stamp, dict(zip(self.aircraft.controls, moved.tolist(), strict=True))))
+        self._log_events()
+
+    def _limited(self) -> LimitedQuantities:
+        """The quantities that have limits, NaN where the sensor's last message is old."""
         now = time.monotonic()
         (imu_time, (roll, pitch, load)), (air_time, airspeed) = self._inertial, self._air
         if now - imu_time > STALE:
             roll = pitch = load = math.nan
         if now - air_time > STALE:
             airspeed = math.nan
-        moved = exciter.step(self._state, self._now, LimitedQuantities(roll, pitch, airspeed, load))
-        stamp = self.get_clock().now().nanoseconds
-        self._excitation.publish(named(stamp, dict(zip(self.aircraft.controls, moved.tolist(), strict=True))))
-        self._log_events()
+        return LimitedQuantities(roll, pitch, airspeed, load)
 
     def _on_start(self, _: Any, response: Any) -> Any:
         try:
-            exciter.start(self._state, self._now)
+            exciter.start(self._state, self._now, self._limited())
             response.success, response.message = True, f"until {', '.join(self._state.settings.derivatives)} are known"
         except InputError as error:
             response.success, response.message = False, str(error)

@@ -12,7 +12,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
-from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -42,8 +42,9 @@ from sysid_node.ros.support.aircraft import aircraft_of
 from sysid_node.ros.support.declaring import declare, refusal, values_of
 from sysid_node.ros.support.diagnostics import DiagnosticSource, lag_level, lag_words, rejections
 from sysid_node.ros.support.lifecycle import CarefulNode
-from sysid_node.ros.support.loop_node import LAST_QOS, SENSOR_QOS, UNHEARD, expected_joints, full_name, say
+from sysid_node.ros.support.loop_node import LAST_QOS, SENSOR_QOS, expected_joints, full_name, say, waiting
 from sysid_node.ros.support.message_types import fields_of
+from sysid_node.ros.support.silence import UNHEARD, ClockWatch
 from sysid_node.ros.support.spin import run_node, while_ros_is_up
 
 DIAGNOSTICS = 1.0  # s between diagnostics
@@ -66,6 +67,7 @@ class Identifier(CarefulNode):
         declare(self, PARAMETERS, check)
         self.add_on_set_parameters_callback(self._on_parameters)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._clock_watch = ClockWatch(self)
         self._reported = -math.inf  # s, time.monotonic of the last diagnostics
         # A steady clock: diagnostics continue while simulated time stands still.
         self.create_timer(TICK, while_ros_is_up(self, self._on_tick), clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -104,6 +106,12 @@ class Identifier(CarefulNode):
         self.get_logger().info(f"identifies {aircraft.name!r}: {', '.join(aircraft.model_structure)}")
         if not_taken := not_taken_in_words(aircraft):
             self.get_logger().warning(not_taken)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Listen; what came while the node did not is no silence."""
+        for monitor in self._monitors.values():
+            monitor.begin()
+        return super().on_activate(state)
 
     def cleanup(self) -> None:
         """Destroy what ``configure`` made, even where it did not finish."""
@@ -236,7 +244,10 @@ class Identifier(CarefulNode):
         )
         monitors, rejected = list(self._monitors.values()), session.rejected
         recent = self._recent.update(monitors, rejected)
-        message.status.append(source.input(monitors, rejected, stale_after, recent, session.force_fault))
+        readings, max_gap = (session.force_fault, session.unchanging), session.settings.max_gap
+        message.status.append(
+            source.input(monitors, rejected, stale_after, recent, readings, max_gap, session.lift_fault)
+        )
         self._warn(session, monitors, recent)
         if not session.samples:
             message.status += [source.waits("estimate"), source.waits("computation")]
@@ -261,18 +272,23 @@ class Identifier(CarefulNode):
 
     def _warn(self, session: Session, monitors: Sequence[TopicMonitor], recent: Sequence[RecentTopic]) -> None:
         """Say in the log which inputs are silent, rejected or late."""
-        present = {
-            monitor.resolved: f"no message for {monitor.waited():.1f} s" if monitor.received else "no message yet"
-            for monitor in monitors
+        present = self._clock_watch.missing() | {
+            monitor.resolved: waiting(self, monitor, subscription)
+            for monitor, subscription in zip(monitors, self._inputs, strict=True)
             if monitor.waited() > UNHEARD
         }
-        present |= rejections([t for t in recent if t.share > FEW], {m.name: m.resolved for m in monitors})
+        names = {monitor.name: monitor.resolved for monitor in monitors}
+        present |= rejections([t for t in recent if t.share > FEW], names, session.settings.max_gap)
         joints, here = expected_joints(session.aircraft), self._monitors[ACTUATORS].resolved
         missing = [joint for joint in joints if joint not in self._joints]
         if missing and here in present and self._joints:
             present[here] += f"; expected joints {', '.join(joints)}, got {', '.join(self._joints)}"
         if session.force_fault:
             present["accelerometer"] = session.force_fault
+        if session.unchanging:
+            present["readings"] = session.unchanging
+        if session.lift_fault:
+            present["lift"] = session.lift_fault
         if session.samples and lag_level(self._lag) != DiagnosticStatus.OK:
             present["estimates"] = lag_words(self._lag)
         say(self, self._conditions.update(present))

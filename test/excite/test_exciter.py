@@ -41,6 +41,18 @@ def test_nothing_moves_until_asked(state: exciter.ExciterState) -> None:
     assert not state.events
 
 
+@pytest.mark.parametrize(
+    ("flight", "words"),
+    [(LEVEL._replace(roll=1.5), "roll 1.5 beyond"), (LEVEL._replace(airspeed=math.nan), "airspeed not measured")],
+)
+def test_it_does_not_begin_beyond_a_limit(state: exciter.ExciterState, flight: LimitedQuantities, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        exciter.start(state, 0.0, flight)
+    assert not state.active
+    exciter.start(state, 0.0, LEVEL)
+    assert state.active
+
+
 def test_it_flies_the_manoeuvre_and_stops_when_enough_is_known(state: exciter.ExciterState) -> None:
     exciter.start(state, 10.0)
     flown = np.array([exciter.step(state, 10.0 + t, LEVEL) for t in np.arange(0.0, 5.0, 0.01)])

@@ -10,7 +10,7 @@ from sysid_node.aircraft.model import UncertainValue
 from sysid_node.errors import InputError
 from sysid_node.flight import align as alignment
 from sysid_node.flight.actuation import Actuation
-from sysid_node.flight.align import AIR_INTERVAL, align, counts_by_reason, flight_record
+from sysid_node.flight.align import AIR_INTERVAL, align, counts_by_reason, flight_record, why_nothing_aligned
 from sysid_node.flight.checks import BEYOND, DUPLICATE, OUT_OF_ORDER, UNSTAMPED, gap
 from sysid_node.flight.streams import Arrival
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
@@ -184,3 +184,24 @@ def test_the_end_of_the_recording_is_not_a_rejection():
     aligned = align(AIRCRAFT, dataclasses.replace(streams, actuators=cut), 1.0)
     assert gap(ACTUATORS) not in aligned.rejected[IMU] or aligned.rejected[IMU][gap(ACTUATORS)] <= 4  # before the first
     assert aligned.stamps[-1] <= cut.arrival.stamp_ns[-1]
+
+
+@pytest.mark.parametrize(
+    ("rejected", "remedy"),
+    [
+        (
+            {"imu/data": {"air_data gap": 90}, "air_data": {"out of order": 9}},
+            "air_data must come more often, or max_gap",
+        ),
+        ({"imu/data": {"actuators gap": 90}}, "actuators must come more often, or max_gap be longer"),
+        (
+            {"imu/data": {"actuators gap": 90}, "actuators": {"no stamp": 91}},
+            "correct the messages or the aircraft file",
+        ),
+    ],
+)
+def test_what_to_do_where_nothing_is_aligned(rejected: dict[str, dict[str, int]], remedy: str) -> None:
+    spans = dict.fromkeys(("imu/data", "air_data", "actuators"), (0.0, 9.0))
+    said = why_nothing_aligned("flight", spans, rejected)
+    assert remedy in said
+    assert "\n" not in said

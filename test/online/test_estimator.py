@@ -229,6 +229,20 @@ def test_with_other_axes_or_units_nothing_is_valid(factor: float) -> None:
     assert {d.status for d in wrong.values()} == {"outside model"}
 
 
+@pytest.mark.parametrize(("column", "concerned"), [("ay", {"CY"}), ("beta", {"CL", "CD", "CY", "Cl", "Cm", "Cn"})])
+def test_what_depends_on_a_reading_that_stands_still_is_not_valid(column: str, concerned: set[str]) -> None:
+    """An accelerometer that reads zero fits derivatives of zero perfectly, each with a narrow interval."""
+    time = np.arange(0.0, 20.0, 0.02)
+    samples = exact_flight(AIRCRAFT, time)
+    samples[:, SAMPLE_COLUMNS.index(column)] = 0.0
+    state = estimator.init(AIRCRAFT, OnlineSettings(method="sls_rft"))
+    for t, sample in zip(time.tolist(), samples.tolist(), strict=True):
+        estimator.update(state, t, sample)
+    found = estimate(state).derivatives
+    assert {name.partition("_")[0] for name, d in found.items() if d.status == "stale input"} == concerned
+    assert {name for name, d in found.items() if d.valid and name.partition("_")[0] in concerned} == set()
+
+
 def test_memory_does_not_grow() -> None:
     """Containers after two minutes are no longer than after one."""
     time = np.arange(0.0, 120.0, 0.05)

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from harness import START_NS, made_up_streams
+from harness import ROOT, START_NS, made_up_streams
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.streams import Streams
 from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.alignment.schedule import due_times
@@ -103,3 +104,12 @@ def test_what_actuators_are_taken_for_follows_the_messages() -> None:
     assert not session.commanded
     stated = Session(load_aircraft("cdrw"), OnlineSettings(actuators="positions"), 10.0)
     assert (stated.commanded, stated.carried) == (False, "")
+
+
+@pytest.mark.parametrize(("scale", "said"), [(1.0, False), (3.6, True)])
+def test_airspeed_in_another_unit_is_said_in_flight(session: Session, scale: float, said: bool) -> None:
+    """All derivatives are wrong then, and valid: they fit the flight as well as the right ones do."""
+    flight = read_streams(ROOT / "bags" / "cdrw_multistep")
+    flight.air_data.values[:, 0] *= scale
+    fly(session, flight, "iaj")
+    assert ("is the airspeed in m/s" in session.lift_fault) == said

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from sysid_node.cli.live.loop_scenario import EXCITE_AT, ONSET, LoopScenario, set_points
 from sysid_node.errors import InputError
+from sysid_node.excite.exciter import UNDER_WAY
 from sysid_node.report.results.closed_loop import Event
 
 if TYPE_CHECKING:
@@ -47,11 +48,12 @@ class LoopDirector:
             raise RuntimeError(f"no command came within {START_UP:g} s; the logs in {logs} may say why")
 
     def _excite(self) -> None:
-        """Request the excitation when it is due, and again some time after it was aborted."""
+        """Request the excitation when it is due, and again some time after it was refused or aborted."""
         if self.watch.time >= self._excite_at:
-            self.watch.excite()
-            self._note("loop", "excitation asked for")
-            self._excite_at = math.inf
+            refused = self.watch.excite()
+            self._note("loop", f"excitation refused: {refused}" if refused else "excitation asked for")
+            begun = not refused or UNDER_WAY in refused
+            self._excite_at = math.inf if begun else self.watch.time + PAUSE
         if self._excite_at == math.inf and self.watch.value("exciter", "last event").startswith("aborted"):
             self._excite_at = self.watch.time + PAUSE
 

@@ -6,6 +6,7 @@ the measured angle of attack.
 
 from __future__ import annotations
 
+import math
 import warnings
 
 import numpy as np
@@ -15,6 +16,8 @@ from sysid_node.errors import InputWarning
 from sysid_node.flight.live.mean_force import AVERAGED
 from sysid_node.flight.record import Array, FlightRecord
 
+REMEMBERED = 10.0  # s over which the means in flight are taken
+EVERY = 0.05  # s between the samples that count in flight
 _RATIO = 2.5  # of two lift coefficients, or airspeeds, from which they do not go together
 _VANE_ERROR = 0.05  # rad: bias of a vane that is not remarkable
 _KNOWN = 0.9  # share of the samples in which the angle of attack must be measured
@@ -49,40 +52,85 @@ class MeanLift:
         if self.seconds < AVERAGED or not self._sums["pressure"]:
             return
         lift = self._sums["lift"] / (self._sums["pressure"] * self.aircraft.geometry.S)
-        airspeed, expected = self._sums["airspeed"] / self._count, self._expected()
-        if expected is None:
-            self._check_airspeed(name, airspeed, lift)
-        elif not self._go_together(lift, expected):
-            text = (
-                f"{name}: mean lift coefficient is {lift:.2f} by the weight, the wing area and the mean airspeed of "
-                f"{airspeed:.1f} m/s, and {expected:.2f} by the angle of attack and the derivatives of "
-                f"{self.aircraft.name!r}: {doubts()}"
-            )
-            warnings.warn(text, InputWarning, stacklevel=2)
+        known = self._angles >= _KNOWN * self._count
+        alpha = self._sums["alpha"] / self._angles if known else math.nan
+        fault = fault_of(self.aircraft, lift, self._sums["airspeed"] / self._count, alpha)
+        if fault:
+            warnings.warn(f"{name}: {fault}", InputWarning, stacklevel=2)
 
-    def _expected(self) -> float | None:
-        """The lift coefficient by the file's derivatives; None where it is not known."""
-        derivatives = self.aircraft.derivatives
-        tabled = any(table.coefficient == "CL" for table in self.aircraft.tables)
-        if tabled or "CL_alpha" not in derivatives or self._angles < _KNOWN * self._count:
-            return None
-        offset = derivatives["CL_0"].value if "CL_0" in derivatives else 0.0
-        return offset + derivatives["CL_alpha"].value * self._sums["alpha"] / self._angles
 
-    def _go_together(self, lift: float, expected: float) -> bool:
-        slope = abs(self.aircraft.derivatives["CL_alpha"].value)
-        stalled = 0.0 < lift < expected and _STALL_ANGLE < self._sums["alpha"] / self._angles < 1.0
-        alike = lift * expected > 0.0 and 1.0 / _RATIO < lift / expected < _RATIO
-        return alike or stalled or abs(lift - expected) < _VANE_ERROR * slope
+class RecentMeanLift:
+    """The means over about the last ``REMEMBERED`` s, one sample at a time, for use in flight."""
 
-    def _check_airspeed(self, name: str, airspeed: float, lift: float) -> None:
-        reference = self.aircraft.reference.airspeed
-        if not 1.0 / _RATIO < airspeed / reference < _RATIO:
-            text = (
-                f"{name}: mean airspeed is {airspeed:.1f} m/s, a lift coefficient of {lift:.2f}; the derivatives of "
-                f"{self.aircraft.name!r} hold for {reference:g} m/s: {doubts()}"
-            )
-            warnings.warn(text, InputWarning, stacklevel=2)
+    def __init__(self, aircraft: Aircraft) -> None:
+        self.aircraft = aircraft
+        self.seconds = 0.0  # of flight that count
+        self._means = [0.0] * 5  # lift N, dynamic pressure Pa, airspeed m/s, alpha rad, share in which alpha is known
+        self._time = self._next = -math.inf  # s
+
+    def add(self, time: float, az: float, airspeed: float, alpha: float, density: float) -> None:
+        """Count a sample: time s, specific force along z m/s^2 (FRD), airspeed m/s, alpha rad, density kg/m^3."""
+        if time < self._next:
+            return
+        step, self._time, self._next = min(time - self._time, 10.0 * EVERY), time, time + EVERY
+        self.seconds = min(self.seconds + step, REMEMBERED)
+        share, known = step / self.seconds, math.isfinite(alpha)
+        lift, pressure = -self.aircraft.mass * az, 0.5 * density * airspeed * airspeed
+        now = (lift, pressure, airspeed, alpha if known else 0.0, float(known))
+        self._means = [mean + share * (value - mean) for mean, value in zip(self._means, now, strict=True)]
+
+    @property
+    def fault(self) -> str:
+        """What does not go together, in words; empty where nothing is wrong, or it is not known yet.
+
+        Nothing is said at low airspeed, where wheels may carry the aircraft.
+        """
+        lift, pressure, airspeed, alpha, known = self._means
+        slow = airspeed < self.aircraft.reference.airspeed / math.sqrt(_RATIO)
+        if self.seconds < REMEMBERED or slow or not pressure:
+            return ""
+        angle = alpha / known if known >= _KNOWN else math.nan
+        return fault_of(self.aircraft, lift / (pressure * self.aircraft.geometry.S), airspeed, angle)
+
+
+def fault_of(aircraft: Aircraft, lift: float, airspeed: float, alpha: float) -> str:
+    """What is wrong with means, in words: lift coefficient, airspeed m/s, alpha rad (NaN = not measured)."""
+    expected = _expected(aircraft, alpha)
+    if math.isnan(expected):
+        return _airspeed_fault(aircraft, airspeed, lift)
+    if _go_together(aircraft, lift, expected, alpha):
+        return ""
+    return (
+        f"mean lift coefficient is {lift:.2f} by the weight, the wing area and the mean airspeed of "
+        f"{airspeed:.1f} m/s, and {expected:.2f} by the angle of attack and the derivatives of "
+        f"{aircraft.name!r}: {doubts()}"
+    )
+
+
+def _expected(aircraft: Aircraft, alpha: float) -> float:
+    """The lift coefficient by the file's derivatives; NaN where it is not known."""
+    derivatives = aircraft.derivatives
+    if any(table.coefficient == "CL" for table in aircraft.tables) or "CL_alpha" not in derivatives:
+        return math.nan
+    offset = derivatives["CL_0"].value if "CL_0" in derivatives else 0.0
+    return offset + derivatives["CL_alpha"].value * alpha
+
+
+def _go_together(aircraft: Aircraft, lift: float, expected: float, alpha: float) -> bool:
+    slope = abs(aircraft.derivatives["CL_alpha"].value)
+    stalled = 0.0 < lift < expected and _STALL_ANGLE < alpha < 1.0
+    alike = lift * expected > 0.0 and 1.0 / _RATIO < lift / expected < _RATIO
+    return alike or stalled or abs(lift - expected) < _VANE_ERROR * slope
+
+
+def _airspeed_fault(aircraft: Aircraft, airspeed: float, lift: float) -> str:
+    reference = aircraft.reference.airspeed
+    if 1.0 / _RATIO < airspeed / reference < _RATIO:
+        return ""
+    return (
+        f"mean airspeed is {airspeed:.1f} m/s, a lift coefficient of {lift:.2f}; the derivatives of "
+        f"{aircraft.name!r} hold for {reference:g} m/s: {doubts()}"
+    )
 
 
 def doubts() -> str:

@@ -19,10 +19,14 @@ class TopicMonitor:
     last: float = float("nan")  # s, by ``clock``, of the last message
     _counted: int = 0  # messages at the last call of ``rate``
     _since: float = float("nan")  # s, of that call
-    _made: float = float("nan")  # s
+    _began: float = float("nan")  # s
 
     def __post_init__(self) -> None:
-        self._since = self._made = self.clock()
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin to wait for messages: at first, and again where a node had not listened."""
+        self._since = self._began = self.clock()
 
     def arrived(self) -> None:
         """Count one more message."""
@@ -31,11 +35,11 @@ class TopicMonitor:
 
     def silence(self) -> float:
         """Seconds since the last message, NaN where there was none."""
-        return self.clock() - self.last
+        return self.clock() - max(self.last, self._began) if self.received else float("nan")
 
     def waited(self) -> float:
-        """Seconds since the last message, or since this monitor was made where there was none."""
-        return self.clock() - (self.last if self.received else self._made)
+        """Seconds since the last message, or since the wait began where that was later."""
+        return self.clock() - (max(self.last, self._began) if self.received else self._began)
 
     def rate(self) -> float:
         """Messages per second since the last call of this method."""

@@ -12,6 +12,7 @@ from typing import Any
 from sysid_node.errors import InputError
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates
+from sysid_node.user_path import user_path
 
 
 def save_estimates(
@@ -26,6 +27,7 @@ def save_estimates(
 ) -> Path:
     """Write ``<aircraft>-<stamp_ns>.json`` into ``folder``, completely or not at all, and return its absolute path.
 
+    A ``~`` at the beginning of ``folder`` is the user's home: no shell expands it in a parameter.
     Characters of the aircraft's name that could lead out of the folder become underscores in the file's name.
 
     ``stamp_ns`` is the header stamp of the last sample, ``samples`` the number of all samples, ``rejected`` the number
@@ -41,7 +43,7 @@ def save_estimates(
         "settings": settings.as_dict(),
         **_findings(estimates),
     }
-    folder = folder.absolute()
+    folder = user_path(folder).absolute()
     path = folder / f"{_file_name(aircraft)}-{stamp_ns}.json"
     partial = path.with_suffix(".part")
     try:

@@ -145,11 +145,21 @@ def judge(state: EstimatorState, latest: SegmentSolution, current: CurrentSoluti
     codes: Codes = bad * _reasons(state, basis, current, bad, inflation, buried, poor)
     if state.inputs.force.fault:
         codes[:] = status.OUTSIDE
+    _withhold_unchanging(state, codes)
     if current.time - state.changes.changed_at < SETTLING:
         codes[:] = status.CHANGED
     if now - current.time > STALE:
         codes[:] = status.STALE
     return codes
+
+
+def _withhold_unchanging(state: EstimatorState, codes: Codes) -> None:
+    """Set the statuses (D,) of estimates that depend on readings that stand still."""
+    concerned = state.inputs.unchanging.coefficients
+    if concerned is None:
+        codes[:] = status.STALE
+    elif concerned:
+        codes[[name.partition("_")[0] in concerned for name in state.model.table.names]] = status.STALE
 
 
 def _narrow(basis: ValidityBasis, current: CurrentSolution) -> Flags:

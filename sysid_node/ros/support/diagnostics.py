@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from sysid_node.flight.checks import gap
 from sysid_node.flight.live.monitor import Durations, TopicMonitor
 from sysid_node.flight.live.recent_counts import ALL, FEW, RecentTopic
 from sysid_node.online.types import Estimates
@@ -37,11 +38,14 @@ class DiagnosticSource:
         rejected: Mapping[str, int],
         stale_after: float,
         recent: Sequence[RecentTopic] = (),
-        force_fault: str = "",
+        wrong_readings: Sequence[str] = (),
+        max_gap: float = 0.0,
+        doubt: str = "",
     ) -> DiagnosticStatus:
         """Rates, silence beyond ``stale_after`` s, and rejected messages (``"<topic>: <reason>"`` -> count).
 
-        ``force_fault``: what is wrong with the mean specific force, in words.
+        ``wrong_readings``: what is wrong with the mean specific force and other readings, in words.
+        ``max_gap``: see ``rejections``. ``doubt``: what may be wrong, which is a warning.
 
         The level is that of the ``recent`` messages: ERROR where as good as all of a topic are rejected, WARN where
         more than a few are.
@@ -58,11 +62,12 @@ class DiagnosticSource:
             f"{t.resolved or t.name} {f'silent for {t.silence():.1f} s' if t.received else 'never received'}"
             for t in silent
         ]
-        wrong = rejections(recent, {t.name: t.resolved for t in topics if t.resolved})
+        wrong = rejections(recent, {t.name: t.resolved for t in topics if t.resolved}, max_gap)
         faults += [f"{name}: {text}" for name, text in wrong.items()]
-        faults += [force_fault] if force_fault else []
+        unlikely = [words for words in wrong_readings if words]
+        faults += [*unlikely, *filter(None, [doubt])]
         worst = max((topic.share for topic in recent if topic.rejected), default=0.0)
-        level = STALE if silent else ERROR if worst >= ALL or force_fault else WARN if worst > FEW else OK
+        level = STALE if silent else ERROR if worst >= ALL or unlikely else WARN if worst > FEW or doubt else OK
         return self._status("input", level, "; ".join(faults) or "all topics arrive", values)
 
     def waits(self, part: str) -> DiagnosticStatus:
@@ -126,13 +131,25 @@ def lag_words(lag: float) -> str:
     return f"{1e3 * lag:.1f} ms after its sample" if lag > -LATE else f"{-lag:.1f} s before the stamp of its sample"
 
 
-def rejections(recent: Sequence[RecentTopic], resolved: Mapping[str, str]) -> dict[str, str]:
-    """What was rejected of each topic lately, by its resolved name."""
+def rejections(recent: Sequence[RecentTopic], resolved: Mapping[str, str], max_gap: float = 0.0) -> dict[str, str]:
+    """What was rejected of each topic lately, by its resolved name, and what to do where that is for gaps in another.
+
+    ``max_gap`` (s) is the longest gap that is interpolated across; 0 where nothing is.
+    """
     words = {}
     for topic in recent:
         if topic.rejected:
             count = sum(topic.rejected.values())
             words[resolved.get(topic.topic, topic.topic)] = (
                 f"{'all' if topic.share >= ALL else count} of {topic.received} messages rejected, most as {topic.most}"
+                + _remedy(topic.most, resolved, max_gap)
             )
     return words
+
+
+def _remedy(reason: str, resolved: Mapping[str, str], max_gap: float) -> str:
+    """What to do where messages are left out for gaps in another topic; empty where they are for something else."""
+    other = next((name for topic, name in resolved.items() if reason == gap(topic)), "")
+    if not other or not max_gap:
+        return ""
+    return f": {other} must come at least every {max_gap:g} s (max_gap), stamped by the same clock"

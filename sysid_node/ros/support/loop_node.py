@@ -27,6 +27,7 @@ from sysid_node.ros.support import conversion
 from sysid_node.ros.support.aircraft import aircraft_of
 from sysid_node.ros.support.declaring import declare, values_of
 from sysid_node.ros.support.message_types import fields_of
+from sysid_node.ros.support.silence import UNHEARD, ClockWatch, why_silent
 from sysid_node.ros.support.spin import while_ros_is_up
 
 COMMAND = "actuators/command"
@@ -49,7 +50,6 @@ LAST_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 #: The parameter of the nodes that model the surfaces.
 LAG = ("actuator_lag", "s", "First-order lag of the surfaces behind their commands.", "For every aircraft.")
-UNHEARD = 2.0  # s without a message, after which a node says so in its log
 EFFECT = "They take effect when the node starts; effects of the flight_simulator at any time."
 
 
@@ -60,10 +60,11 @@ class LoopNode(Node, ABC):
         super().__init__(name)
         self.inputs: dict[str, TopicMonitor] = {}  # by topic; the monitors' names are the resolved ones
         self.present: Mapping[str, str] = {}  # the conditions that were found last
-        self._needed: set[str] = set()  # topics without which the node cannot do its work
+        self._needed: dict[str, Any] = {}  # subscriptions to topics without which the node cannot do its work
         self._left_out: Counter[tuple[str, str]] = Counter()  # since the last report, by resolved topic and reason
         self._foreign = ""  # the aircraft whose estimates came since the last report, where it is another one
         self._conditions, self._states = Conditions(), ReportedStates()
+        self._clock_watch = ClockWatch(self)
         self._table, self._live = table, live
         declare(self, table, lambda values: check_each(table, values))
         self.values = values_of(self, table)
@@ -133,9 +134,10 @@ class LoopNode(Node, ABC):
             take(message)
 
         careful = while_ros_is_up(self, on_message)
-        monitor.name = self.create_subscription(kind, topic, careful, profile, raw=raw).topic_name
+        subscription = self.create_subscription(kind, topic, careful, profile, raw=raw)
+        monitor.name = subscription.topic_name
         if needed:
-            self._needed.add(topic)
+            self._needed[topic] = subscription
 
     def is_ours(self, message: Any) -> bool:
         """Whether estimates are of this node's aircraft; those of another one are to be left out, and are reported."""
@@ -190,12 +192,18 @@ class LoopNode(Node, ABC):
         return {self.inputs[DERIVATIVES].name: words}
 
     def _silent(self) -> dict[str, str]:
-        """The needed topics without a message for ``UNHEARD`` s, by resolved name."""
-        return {
-            monitor.name: f"no message for {monitor.waited():.1f} s" if monitor.received else "no message yet"
-            for topic, monitor in self.inputs.items()
-            if topic in self._needed and monitor.waited() > UNHEARD
+        """The needed topics without a message for ``UNHEARD`` s, by resolved name; and /clock."""
+        return self._clock_watch.missing() | {
+            self.inputs[topic].name: waiting(self, self.inputs[topic], subscription)
+            for topic, subscription in self._needed.items()
+            if self.inputs[topic].waited() > UNHEARD
         }
+
+
+def waiting(node: Node, monitor: TopicMonitor, subscription: Any) -> str:
+    """Since when a topic is silent, and why."""
+    since = f"no message for {monitor.waited():.1f} s" if monitor.received else "no message yet"
+    return since + why_silent(node, subscription)
 
 
 def say(node: Node, lines: Iterable[tuple[bool, str]]) -> None:

@@ -71,8 +71,9 @@ class LoopWatch:
         return str(answer.results[0].reason)
 
     def excite(self) -> str:
-        """Begin the excitation; returns the exciter's answer."""
-        return str(self.call(Trigger, "exciter/start", Trigger.Request()).message)
+        """Begin the excitation; returns why the exciter refuses, empty where it does not."""
+        answer = self.call(Trigger, "exciter/start", Trigger.Request())
+        return "" if answer.success else str(answer.message)
 
     def said(self, node: str) -> str:
         """The last message of a node on /diagnostics."""

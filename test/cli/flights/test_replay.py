@@ -18,7 +18,7 @@ from sysid_node.api import load, replay
 from sysid_node.api.replaying import replay_settings
 from sysid_node.cli.main import main
 from sysid_node.cli.shared.options import settings_of
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.flight.bag.message_types import type_store
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import write_streams
@@ -394,3 +394,13 @@ def test_derivatives_are_estimated_on_top_of_the_files_tables(tmp_path):
     found = json.loads((tmp_path / "out" / "summary.json").read_text())["derivatives"]
     for name in ("CL_alpha", "Cm_alpha", "Cm_de"):
         assert found[name]["value"] == pytest.approx(plain.derivatives[name].value, rel=0.05), name
+
+
+def test_a_reading_that_stands_still_is_warned_of(tmp_path):
+    """Sideslip that is always zero, as a driver leaves it that has no vane."""
+    still = read_streams(Path(__file__).resolve().parents[3] / "bags" / "cdrw_multistep")
+    still.air_data.values[:, 2] = 0.0
+    write_streams(tmp_path / "still", still)
+    with pytest.warns(InputWarning, match=r"still: sideslip: no change for 10 s.*publish NaN for a flow angle"):
+        found = replay(load(tmp_path / "still", "cdrw"), judge_faults=False)
+    assert {d.status for d in found.final.derivatives.values()} == {"stale input"}

@@ -21,6 +21,7 @@ class RecordedWatch:
     commands: bool = True
     refusal: str = ""
     aborted_at: float = 1e9  # s: the excitation is reported as aborted for a moment
+    excited_from: float = 0.0  # s: requests for excitation are refused before
     time: float = 0.0
     tracking: list[object] = field(default_factory=list)
     requests: list[tuple[float, str]] = field(default_factory=list)
@@ -34,8 +35,9 @@ class RecordedWatch:
     def ask_for(self, points: dict[str, float]) -> None:
         self.points = points
 
-    def excite(self) -> None:
+    def excite(self) -> str:
         self.requests.append((self.time, "excite"))
+        return "roll not measured" if self.time < self.excited_from else ""
 
     def set_effects(self, effects: str) -> str:
         self.requests.append((self.time, effects))
@@ -82,6 +84,14 @@ def test_an_aborted_excitation_is_requested_again_after_a_pause() -> None:
         pytest.approx(3.0, abs=2 * PERIOD),
         pytest.approx(9.0, abs=3 * PERIOD),
     ]
+
+
+def test_excitation_that_is_refused_is_asked_for_again() -> None:
+    watch = RecordedWatch(excited_from=8.0)
+    director = directed(watch, 20.0, fail="")
+    assert [time for time, _ in watch.requests] == pytest.approx([3.0, 6.0, 9.0], abs=4 * PERIOD)
+    said = [event.text for event in director.events]
+    assert said == ["excitation refused: roll not measured"] * 2 + ["excitation asked for"]
 
 
 def test_a_report_is_an_event_when_it_changes() -> None:

@@ -10,7 +10,7 @@ import pytest
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputWarning
-from sysid_node.flight.live.mean_lift import MeanLift, checked_lift
+from sysid_node.flight.live.mean_lift import REMEMBERED, MeanLift, RecentMeanLift, checked_lift
 from sysid_node.flight.record import FlightRecord
 
 CDRW = load_aircraft("cdrw")
@@ -75,3 +75,36 @@ def test_pieces_count_like_the_whole() -> None:
         lift.add(TIME[part], *(column[part] for column in columns))
     with pytest.warns(InputWarning, match=r"0\.02 "):
         lift.check("made")
+
+
+def flown(begin: float = 0.0, mean: RecentMeanLift | None = None, **flight: float) -> RecentMeanLift:
+    """The mean of 10 s of level flight, taken one sample at a time; what is said before it is known is nothing."""
+    mean, record = mean or RecentMeanLift(CDRW), level(**flight)  # type: ignore[arg-type]
+    for time, *sample in zip(TIME + begin, *(record[name] for name in ("az", "V", "alpha", "rho")), strict=True):
+        assert mean.fault == "" or mean.seconds >= REMEMBERED
+        mean.add(float(time), *map(float, sample))
+    return mean
+
+
+@pytest.mark.parametrize("vane", [True, False])
+def test_in_flight_airspeed_in_another_unit_is_said(vane: bool) -> None:
+    said = flown(scale=3.6, vane=vane).fault
+    assert "64.8 m/s" in said
+    assert "is the airspeed in m/s" in said
+
+
+def test_in_flight_knots_are_said_where_there_is_a_vane() -> None:
+    assert "0.07 by the weight" in flown(scale=1.944).fault
+
+
+def test_in_flight_nothing_is_said_of_what_goes_together_or_rolls_on_wheels() -> None:
+    for airspeed in (11.5, 18.0, 40.0):
+        assert flown(airspeed=airspeed).fault == ""
+    assert flown(scale=0.2).fault == ""  # the weight would ask for 25 times the lift
+
+
+def test_in_flight_what_was_wrong_long_ago_is_forgotten() -> None:
+    mean = flown(scale=1.944)
+    for repeat in range(1, 4):
+        mean = flown(10.0 * repeat, mean)
+    assert mean.fault == ""

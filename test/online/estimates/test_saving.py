@@ -62,3 +62,12 @@ def test_whatever_the_aircraft_is_called_the_file_is_in_the_folder(tmp_path: Pat
 def test_the_path_is_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert save(Path()) == tmp_path / "cdrw-7.json"
+
+
+def test_the_home_of_the_user_is_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A parameter passes no shell; a folder called ~ had been made."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert save(Path("~/flights")) == tmp_path / "flights" / "cdrw-7.json"
+    with pytest.raises(InputError, match="no home directory"):
+        save(Path("~nobody_of_that_name/flights"))

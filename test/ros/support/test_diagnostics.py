@@ -73,6 +73,35 @@ def test_what_was_rejected_at_the_start_is_forgotten_after_ten_seconds() -> None
     assert levels[12:] == [OK, OK, OK]
 
 
+@pytest.mark.parametrize(
+    ("reason", "remedy"),
+    [
+        ("air_data gap", ": /uav1/air_data must come at least every 0.2 s (max_gap), stamped by the same clock"),
+        ("x", ""),
+    ],
+)
+def test_gaps_in_another_topic_are_said_with_what_to_do(reason: str, remedy: str) -> None:
+    topics = [TopicMonitor("imu/data", resolved="/uav1/imu/data"), TopicMonitor("air_data", resolved="/uav1/air_data")]
+    for _ in range(10):
+        topics[0].arrived()
+        topics[1].arrived()
+    recent = RecentCounts()
+    lately = recent.update(topics, {f"imu/data: {reason}": 10})
+    status = SOURCE.input(topics, {}, 60.0, lately, max_gap=0.2)
+    assert status.message == f"/uav1/imu/data: all of 10 messages rejected, most as {reason}{remedy}"
+
+
+def test_unlikely_readings_are_an_error() -> None:
+    status = SOURCE.input([], {}, 0.5, wrong_readings=("", "sideslip: no change for 10 s"))
+    assert (status.level, status.message) == (ERROR, "sideslip: no change for 10 s")
+    assert SOURCE.input([], {}, 0.5, wrong_readings=("", "")).level == OK
+
+
+def test_what_may_be_wrong_is_a_warning() -> None:
+    status = SOURCE.input([], {}, 0.5, doubt="is the airspeed in m/s?")
+    assert (status.level, status.message) == (WARN, "is the airspeed in m/s?")
+
+
 @pytest.mark.parametrize(("lag", "level"), [(0.02, OK), (0.8, WARN), (4.0, ERROR), (-1.0, WARN), (1e8, OK)])
 def test_lateness_has_a_level(lag: float, level: bytes) -> None:
     """It said OK at 4 s."""

@@ -10,6 +10,10 @@ from sysid_node.ros.support.loop_watch import MONITOR, LoopWatch
     ("said", "news"),
     [
         ("learns what sound flight is like; /imu/data: no message yet", "learns what sound flight is like"),
+        (
+            "nothing has failed; /imu/data: no message yet: nobody publishes it, but x is on /a: remap it?",
+            "nothing has failed",
+        ),
         ("elevator: loss of effectiveness, 58 % (49 % to 67 %)", "elevator: loss of effectiveness"),
         ("imu/data: sensor silent, 2.1 s; /uav1/imu/data: no message for 2.1 s", "imu/data: sensor silent"),
     ],

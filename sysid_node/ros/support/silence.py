@@ -1,0 +1,57 @@
+"""Why a topic is silent, as far as the graph of ROS tells: nobody publishes it, or not as this node listens to it."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import QoSCompatibility, qos_check_compatible
+
+UNHEARD = 2.0  # s without a message, after which a node says so in its log
+SHOWN = 3  # topics of the right type that are named at most
+
+
+def why_silent(node: Node, subscription: Any) -> str:
+    """Why no message comes to a ``subscription`` of the node, in words with a colon before; empty where it is unknown.
+
+    A publisher that has the right type and quality of service, and sends nothing, is no reason that is known.
+    """
+    topic, wanted = subscription.topic_name, _type_name(subscription.msg_type)
+    publishers = node.get_publishers_info_by_topic(topic)
+    if not publishers:
+        return f": nobody publishes it{_elsewhere(node, topic, wanted)}"
+    right = [one for one in publishers if one.topic_type == wanted]
+    if not right:
+        types = ", ".join(sorted({one.topic_type for one in publishers}))
+        return f": it is published as {types}, not as {wanted}"
+    checks = [qos_check_compatible(one.qos_profile, subscription.qos_profile) for one in right]
+    if all(compatible == QoSCompatibility.ERROR for compatible, _ in checks):
+        return ": its publisher's quality of service is not what this node asks for (see qos_overrides)"
+    return ""
+
+
+class ClockWatch:
+    """Whether /clock has come to a node that takes its time from there."""
+
+    def __init__(self, node: Node) -> None:
+        self._node, self._since = node, time.monotonic()
+
+    def missing(self) -> dict[str, str]:
+        """The topic /clock with what is wrong with it, where none has come for ``UNHEARD`` s; else nothing."""
+        simulated = self._node.get_parameter("use_sim_time").value
+        waits = simulated and self._node.get_clock().now().nanoseconds == 0
+        late = time.monotonic() - self._since > UNHEARD
+        return {"/clock": "no message yet, and use_sim_time is true"} if waits and late else {}
+
+
+def _elsewhere(node: Node, topic: str, wanted: str) -> str:
+    """The topics with messages of the type that is wanted, in words; empty where there are none."""
+    names = [name for name, types in node.get_topic_names_and_types() if wanted in types and name != topic]
+    found = sorted(name for name in names if node.count_publishers(name))
+    more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
+    return f", but {wanted} is published on {', '.join(found[:SHOWN])}{more}: remap it?" if found else ""
+
+
+def _type_name(kind: Any) -> str:
+    return f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
