@@ -34,6 +34,7 @@ class Plan:
     ) -> None:
         self.settings, self.cache, self._state = settings, cache, state
         self._aircraft = _AircraftFiles()
+        self._log_faults: dict[str, str] = {}  # by flight, as its log was looked at last
         self.catalogue = replace(catalogue, flights=tuple(map(self._with_aircraft_fault, catalogue.flights)))
 
     def aircraft_of(self, entry: CatalogueFlight) -> Aircraft | None:
@@ -50,21 +51,35 @@ class Plan:
             return entry
         return replace(entry, fault=self._aircraft.loaded(entry.aircraft)[2])
 
+    def fault_of(self, entry: CatalogueFlight) -> str:
+        """What is wrong with a flight, one line: with its entry, or with its log where ``flights`` came to it."""
+        return entry.fault or self._log_faults.get(entry.flight, "")
+
     def flights(self, progress: Callable[[], None] = lambda: None) -> Iterator[PlannedFlight]:
-        """Every flight, one at a time; logs are hashed as they come. ``progress`` is called after each."""
+        """Every flight, one at a time; logs are hashed as they come. ``progress`` is called after each.
+
+        A log that an earlier flight of the same type has, too, under whatever name, is a fault: it would count twice.
+        """
         finished = self._state.fingerprints() if self._state is not None else {}
+        first: dict[tuple[str, str], str] = {}  # flight by type and log
         for entry in self.catalogue.flights:
-            yield self._planned(entry, finished)
+            yield self._planned(entry, finished, first)
             progress()
 
-    def _planned(self, entry: CatalogueFlight, finished: dict[str, str]) -> PlannedFlight:
+    def _planned(
+        self, entry: CatalogueFlight, finished: dict[str, str], first: dict[tuple[str, str], str]
+    ) -> PlannedFlight:
         if entry.fault:
             return PlannedFlight(entry, None, "", done=False)
         aircraft, text, _ = self._aircraft.loaded(entry.aircraft)
         assert aircraft is not None
         try:
             log = self._hash(entry.location)
+            earlier = first.setdefault((aircraft.name, log), entry.flight)
+            if earlier != entry.flight:
+                raise InputError(f"{entry.flight}: is the same log as {earlier}, and would count twice; keep one")
         except InputError as error:
+            self._log_faults[entry.flight] = str(error)
             return PlannedFlight(replace(entry, fault=str(error)), None, "", done=False)
         key = fingerprint(log, text, self.settings.as_dict())
         task = FlightTask(entry.flight, entry.location, aircraft, self.settings, self.cache)

@@ -25,8 +25,8 @@ LINES = ["--frequencies", "0.2:0.2:2.0"]
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with two flights of two tails, a log that is none, a catalogue, and the fleet's results in ``out``."""
     folder = tmp_path_factory.mktemp("fleet")
-    write_streams(folder / "a", made_streams(12.0))
-    shutil.copytree(folder / "a", folder / "b")
+    for seed, name in enumerate("ab"):
+        write_streams(folder / name, made_streams(12.0, seed))
     (folder / "c.ulg").write_bytes(b"ULog\x01\x12\x35\x01damaged")
     (folder / "made.yaml").write_text(dump_aircraft(made_aircraft()))
     (folder / "fleet.csv").write_text(
@@ -75,6 +75,8 @@ def test_a_fleet_gives_the_replays_estimates_with_their_covariance(fleet: Path) 
         assert float(row["systematic_error"]) == pytest.approx(estimate.systematic_error, rel=1e-6, abs=1e-12)
         assert (row["valid"] == "True") == estimate.valid
     covariance = pq.read_table(fleet / "out" / "covariances.parquet").to_pylist()
+    covariance = [row for row in covariance if row["flight"] == "a"]
+    assert covariance
     assert single.covariance is not None
     names, total = single.covariance.names, single.covariance.total
     for row in covariance:
@@ -117,6 +119,19 @@ def test_a_dry_run_says_what_is_wrong_with_which_flight(tmp_path: Path, capsys: 
     assert "aircraft 'no_such' is not known" in said
     assert "0 to do, 0 done, 2 with a fault" in said
     assert not (tmp_path / "out").exists()
+
+
+def test_a_log_that_is_there_twice_counts_once(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(fleet / "a", fleet / "copy")
+    given = (fleet / "fleet.csv").read_text()
+    (fleet / "twice.csv").write_text(given + "copy,made.yaml,7,,2026-05-09,\n")
+    assert main([*arguments(fleet)[:1], str(fleet / "twice.csv"), *arguments(fleet)[2:]]) == 0
+    found = json.loads((fleet / "out" / "fleet.json").read_text())
+    assert [flight["flight"] for flight in found["flights"]] == ["a", "b"]
+    reasons = {refusal["flight"]: refusal["reason"] for refusal in found["refusals"]}
+    assert reasons["copy"] == "copy: is the same log as a, and would count twice; keep one"
+    assert main([*arguments(fleet)[:1], str(fleet / "twice.csv"), *arguments(fleet, "--dry-run")[2:]]) == 0
+    assert "0 to do, 3 done, 1 with a fault" in capsys.readouterr().out
 
 
 def test_of_two_commands_on_one_folder_the_second_says_so(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
