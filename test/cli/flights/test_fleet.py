@@ -14,6 +14,7 @@ import pytest
 from made_flights import made_aircraft, made_streams
 
 from sysid_node.aircraft.dump import dump_aircraft
+from sysid_node.aircraft.load import load_aircraft
 from sysid_node.api import load, replay
 from sysid_node.cli.main import main
 from sysid_node.flight.bag.writer import write_streams
@@ -132,6 +133,33 @@ def test_a_log_that_is_there_twice_counts_once(fleet: Path, capsys: pytest.Captu
     assert reasons["copy"] == "copy: is the same log as a, and would count twice; keep one"
     assert main([*arguments(fleet)[:1], str(fleet / "twice.csv"), *arguments(fleet, "--dry-run")[2:]]) == 0
     assert "0 to do, 3 done, 1 with a fault" in capsys.readouterr().out
+
+
+def test_files_of_one_type_may_differ_in_all_but_the_geometry(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = (fleet / "made.yaml").read_text()
+    (tmp_path / "heavy.yaml").write_text(
+        made.replace("mass: 2.0", "mass: 2.2").replace("{value: -0.9}", "{value: -0.8}")
+    )
+    (tmp_path / "large.yaml").write_text(made.replace("S: 0.4", "S: 0.8"))
+    (tmp_path / "fleet.csv").write_text(
+        "path,aircraft,tail,date\n"
+        f"{fleet / 'a'},{fleet / 'made.yaml'},7,2026-05-03\n"
+        f"{fleet / 'b'},heavy.yaml,8,2026-05-03\n"
+        f"{fleet / 'b'},large.yaml,9,2026-05-03\n"
+    )
+    assert main([word for word in arguments(tmp_path) if word != "--quiet"]) == 0
+    warning = "the files of type made do not state Cm_de alike: not compared with the flights"
+    assert warning in capsys.readouterr().err
+    found = json.loads((tmp_path / "out" / "fleet.json").read_text())
+    (refusal,) = found["refusals"]
+    assert "is named made as " in refusal["reason"]
+    assert "another geometry" in refusal["reason"]
+    masses = {tail: load_aircraft(tmp_path / "out" / "tails" / f"{tail}.yaml").mass for tail in (7, 8)}
+    assert masses == {7: 2.0, 8: 2.2}
+    compared = {row["name"] for row in found["summary"]["differences_from_file"]}
+    assert compared <= {"Cm_0", "Cm_alpha"}
 
 
 def test_of_two_commands_on_one_folder_the_second_says_so(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
