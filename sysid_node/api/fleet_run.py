@@ -64,7 +64,8 @@ def run_fleet(
 
     ``inputs``: paths that ``out`` must not hold. ``say`` is called with the address of the workers' dashboard, and
     ``progress`` with the share done (0..1) and the flight that came back last. Raises InputError where settings are
-    wrong, another run uses the folder, it cannot be written, or no worker is found.
+    wrong, another run uses the folder, it cannot be written, or no worker is found. Warns (InputWarning) of aircraft
+    files of one type that differ, and of maintenance of tails that are not there.
     """
     check_settings(settings)
     out = Path(out)
@@ -96,6 +97,7 @@ def _report(plan: Plan, state: FleetState, catalogue: Catalogue) -> FleetReport:
     of_tails = {(flight.aircraft, flight.tail): of_flights[flight.flight] for flight in results.flights}  # the last
     known = {key: aircraft for key, aircraft in of_tails.items() if aircraft is not None}
     _warn_of_files(files, known)
+    _warn_of_notes(results)
     return FleetReport(results, summarise(results, files), files, known)
 
 
@@ -106,6 +108,15 @@ def _warn_of_files(files: Mapping[str, Aircraft], of_tails: Mapping[tuple[str, s
         if left := sorted(stated - set(aircraft.derivatives)):
             text = f"the files of type {name} do not state {', '.join(left)} alike: not compared with the flights"
             warnings.warn(text, InputWarning, stacklevel=3)
+
+
+def _warn_of_notes(results: FleetResults) -> None:
+    """Warn (InputWarning) of maintenance of a tail that no flight with a result has."""
+    tails = {(flight.aircraft, flight.tail) for flight in results.flights}
+    for note in results.maintenance:
+        if not any(note.concerns(*tail) for tail in tails):
+            text = f"maintenance of {note.tail} on {note.date:%Y-%m-%d} ({note.text}): no flight of such a tail has a"
+            warnings.warn(f"{text} result; is the tail's name right?", InputWarning, stacklevel=3)
 
 
 @contextmanager

@@ -57,4 +57,5 @@ def _result(plan: Plan, flight: CatalogueFlight, entry: FlightEntry | None) -> F
         valid=outcome.valid,
         gap=entry.gap,
         report=entry.report,
+        remarks=entry.remarks,
     )

@@ -95,6 +95,14 @@ def test_each_tail_has_an_aircraft_file_with_the_fleets_values(written):
     assert (read.derivatives["Cl_da"].value, read.derivatives["Cl_da"].tolerance) == (prior.value, prior.tolerance)
 
 
+def test_a_tails_file_keeps_what_its_own_file_says_of_its_mass(written, tmp_path):
+    heavy = replace(load_aircraft("cdrw"), mass=4.4)
+    files = {"cdrw": load_aircraft("cdrw")}
+    write(written[1], written[2], tmp_path, files, {("cdrw", "t3"): heavy})
+    masses = [load_aircraft(tmp_path / "tails" / f"{tail}.yaml").mass for tail in ("t2", "t3")]
+    assert masses == [4.0, 4.4]
+
+
 def test_a_drift_in_a_technicians_words(written):
     drift = written[2].drifts["cdrw", "t3", "Cl_da"]
     course = replace(drift.course, kind="step", since=START.timestamp() / DAY)

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,10 @@ import pytest
 from made_flights import made_aircraft, made_streams
 
 from sysid_node.aircraft.dump import dump_aircraft
-from sysid_node.aircraft.load import load_aircraft
 from sysid_node.api import load, replay
 from sysid_node.cli.main import main
 from sysid_node.flight.bag.writer import write_streams
+from sysid_node.flight.streams import Arrival
 
 LINES = ["--frequencies", "0.2:0.2:2.0"]
 
@@ -36,6 +37,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "b,made.yaml,8,pod,2026-05-04T10:00:00Z,\n"
         "c.ulg,made.yaml,8,,2026-05-05,\n"
         ",made.yaml,7,,2026-05-01,new servo\n"
+        ",,70,,2026-05-01,of no flight\n"
     )
     assert main(arguments(folder)) == 0
     return folder
@@ -63,7 +65,8 @@ def test_a_fleet_gives_the_replays_estimates_with_their_covariance(fleet: Path) 
     assert [refusal["flight"] for refusal in found["refusals"]] == ["c.ulg"]
     assert "c.ulg" in found["refusals"][0]["reason"]
     assert found["maintenance"] == [
-        {"aircraft": "made", "tail": "7", "date": "2026-05-01T00:00:00+00:00", "text": "new servo"}
+        {"aircraft": "made", "tail": "7", "date": "2026-05-01T00:00:00+00:00", "text": "new servo"},
+        {"aircraft": "", "tail": "70", "date": "2026-05-01T00:00:00+00:00", "text": "of no flight"},
     ]
     flight = load(fleet / "a", fleet / "made.yaml")
     single = replay(flight, {"frequencies": "0.2:0.2:2.0", "publish_rate": 1.0}, judge_faults=False)
@@ -144,10 +147,10 @@ def test_files_of_one_type_may_differ_in_all_but_the_geometry(
     )
     (tmp_path / "large.yaml").write_text(made.replace("S: 0.4", "S: 0.8"))
     (tmp_path / "fleet.csv").write_text(
-        "path,aircraft,tail,date\n"
-        f"{fleet / 'a'},{fleet / 'made.yaml'},7,2026-05-03\n"
-        f"{fleet / 'b'},heavy.yaml,8,2026-05-03\n"
-        f"{fleet / 'b'},large.yaml,9,2026-05-03\n"
+        "path,flight,aircraft,tail,date\n"
+        f"{fleet / 'a'},a,{fleet / 'made.yaml'},7,2026-05-03\n"
+        f"{fleet / 'b'},b,heavy.yaml,8,2026-05-03\n"
+        f"{fleet / 'b'},c,large.yaml,9,2026-05-03\n"
     )
     assert main([word for word in arguments(tmp_path) if word != "--quiet"]) == 0
     warning = "the files of type made do not state Cm_de alike: not compared with the flights"
@@ -156,10 +159,30 @@ def test_files_of_one_type_may_differ_in_all_but_the_geometry(
     (refusal,) = found["refusals"]
     assert "is named made as " in refusal["reason"]
     assert "another geometry" in refusal["reason"]
-    masses = {tail: load_aircraft(tmp_path / "out" / "tails" / f"{tail}.yaml").mass for tail in (7, 8)}
-    assert masses == {7: 2.0, 8: 2.2}
-    compared = {row["name"] for row in found["summary"]["differences_from_file"]}
-    assert compared <= {"Cm_0", "Cm_alpha"}
+
+
+def test_what_a_single_flights_command_warns_of_is_said_here_too(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = made_streams(12.0)
+    streams = (made.imu, made.air_data, made.actuators)
+    imu, air_data, actuators = (replace(s, arrival=replace(s.arrival, log_ns=set_ahead(s.arrival))) for s in streams)
+    write_streams(tmp_path / "c", replace(made, imu=imu, air_data=air_data, actuators=actuators))
+    (tmp_path / "fleet.csv").write_text(
+        f"path,aircraft,tail,date,maintenance\nc,{fleet / 'made.yaml'},7,2026-05-03,\n,,70,2026-05-01,of no flight\n"
+    )
+    assert main([word for word in arguments(tmp_path) if word != "--quiet"]) == 0
+    said = capsys.readouterr()
+    assert "  warning of c: bag c: the recorder's clock jumps by 300 s" in said.out
+    assert "maintenance of 70 on 2026-05-01 (of no flight): no flight of such a tail has a result" in said.err
+    assert "the recorder&#39;s clock jumps by 300 s" in (tmp_path / "out" / "report.html").read_text()
+    (row,) = csv.DictReader((tmp_path / "out" / "flights.csv").open())
+    assert row["remarks"].startswith("bag c: the recorder's clock jumps by 300 s")
+
+
+def set_ahead(arrival: Arrival) -> np.typing.NDArray[np.int64]:
+    """The recorder's stamps, ns, with its clock set 300 s ahead in the middle of the flight."""
+    return np.asarray(arrival.log_ns + 300 * 10**9 * (arrival.stamp_ns > 106 * 10**9))
 
 
 def test_of_two_commands_on_one_folder_the_second_says_so(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -29,6 +29,9 @@ def opening(report: FleetReport) -> dict[str, Any]:
         ("Types", ", ".join(summary.tails) or "none"),
         ("Refused", str(len(report.results.refusals))),
     ]
+    warned = sum(bool(flight.remarks) for flight in report.results.flights)
+    if warned:
+        facts.append(("With warnings", str(warned)))
     return {
         "facts": facts,
         "drifting": _shortened(drifting),
