@@ -176,12 +176,14 @@ def _flights(row: _Row, base: Path, aircraft: str) -> Iterator[CatalogueFlight]:
 
 
 def _of_pattern(pattern: str, found: list[str]) -> list[str]:
-    """What a pattern matches without files that are no flights, and without the files of bags that it matches, too."""
+    """What a pattern matches without files that are no flights, files of bags that it matches, and folders of flights."""
     if found == [pattern] or not locations.has_marks(pattern):
         return found
     bags = {path for path in found if not locations.is_remote(path) and (Path(path) / "metadata.yaml").is_file()}
     kept = [path for path in found if not bags.intersection(map(str, Path(path).parents))]
-    return [path for path in kept if path in bags or Path(path).suffix.lower() not in _SKIPPED]
+    flights = [path for path in kept if path in bags or Path(path).suffix.lower() not in _SKIPPED]
+    folders = {str(folder) for path in flights for folder in Path(path).parents}
+    return [path for path in flights if path not in folders]
 
 
 def _aircraft_path(given: str, base: Path) -> str:
