@@ -176,7 +176,7 @@ def _flights(row: _Row, base: Path, aircraft: str) -> Iterator[CatalogueFlight]:
 
 
 def _of_pattern(pattern: str, found: list[str]) -> list[str]:
-    """What a pattern matches without files that are no flights, files of bags that it matches, and folders of flights."""
+    """What a pattern matches, without files that are no flights, files of bags, and folders of flights."""
     if found == [pattern] or not locations.has_marks(pattern):
         return found
     bags = {path for path in found if not locations.is_remote(path) and (Path(path) / "metadata.yaml").is_file()}
