@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shlex
 import warnings
 from collections.abc import Mapping
@@ -40,6 +41,8 @@ _RATE, _HELD_RATE = 200.0, 1000.0
 _HEIGHT = 100.0
 #: Multiple of the file's noise where none is given.
 _NOISE = 1.0
+#: Memory of a step of the integration with its outputs and messages, as measured on flights of 5 and 20 minutes.
+_BYTES_A_STEP = 1800.0
 #: Flow angle (rad) beyond which no file's derivatives describe the flight.
 _TUMBLED = np.pi / 4
 #: Failures that reduce the effect of a surface; a stuck surface does so relative to its command.
@@ -123,6 +126,7 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
         rotary_gusts=not args.linear_gusts,
         command_rate=command_rate,
     )
+    _check_memory(args.duration, rate)
     plan = _plan(args, simulator, command_rate or rate)
     sortie = fly_sortie(simulator, _deflections(args, simulator, plan), conditions)
     if plan is not None:
@@ -156,6 +160,17 @@ def _check_options(args: argparse.Namespace, aircraft: Aircraft) -> None:
     said = "--linear-gusts" if args.linear_gusts else f"--height {args.height:g}" if args.height != _HEIGHT else ""
     if said:
         raise InputError(f"{said}: there is no turbulence that it changes; give --turbulence, or leave it out")
+
+
+def _check_memory(duration: float | None, rate: float) -> None:
+    """Raise InputError where a flight of this duration (s), integrated at a rate (Hz), has no room on this machine."""
+    needed = (duration or 0.0) * rate * _BYTES_A_STEP
+    there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if needed > there:
+        raise InputError(
+            f"--duration {duration:g}: takes about {needed / 1e9:.0f} GB of memory at {rate:g} steps a second, and this "
+            f"machine has {there / 1e9:.0f}; fly several shorter flights"
+        )
 
 
 def _plan(args: argparse.Namespace, simulator: Simulator, command_rate: float) -> Manoeuvre | None:
