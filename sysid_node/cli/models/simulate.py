@@ -168,8 +168,8 @@ def _check_memory(duration: float | None, rate: float) -> None:
     there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed > there:
         raise InputError(
-            f"--duration {duration:g}: takes about {needed / 1e9:.0f} GB of memory at {rate:g} steps a second, and this "
-            f"machine has {there / 1e9:.0f}; fly several shorter flights"
+            f"--duration {duration:g}: takes about {needed / 1e9:.0f} GB of memory at {rate:g} steps a second, and "
+            f"this machine has {there / 1e9:.0f}; fly several shorter flights"
         )
 
 

@@ -90,8 +90,8 @@ def model_of(aircraft: Aircraft) -> AircraftNumbers:
     if not np.isfinite(moments).all():
         missing = [name for name, value in vars(inertia).items() if not np.isfinite(value)]
         raise InputError(
-            f"aircraft {aircraft.name!r}: inertia without {', '.join(missing)}: simulation needs Ixx, Iyy, Izz and Ixz; "
-            "complete the file"
+            f"aircraft {aircraft.name!r}: inertia without {', '.join(missing)}: simulation needs Ixx, Iyy, Izz and "
+            "Ixz; complete the file"
         )
     lift, alpha = reference_flight(aircraft)
     geometry, throttle = aircraft.geometry, aircraft.throttle
