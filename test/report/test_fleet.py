@@ -95,6 +95,16 @@ def test_each_tail_has_an_aircraft_file_with_the_fleets_values(written):
     assert (read.derivatives["Cl_da"].value, read.derivatives["Cl_da"].tolerance) == (prior.value, prior.tolerance)
 
 
+def test_where_too_few_tails_are_compared_the_page_says_so(written, tmp_path):
+    said = "No tail is compared here: that takes three other tails"
+    assert said not in (written[0] / "report.html").read_text(encoding="utf-8")
+    results = FleetResults(tuple(fleet(tails=3)), (), ())
+    write(results, summarise(results), tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert said in page
+    assert "too few tails to compare it with" in page
+
+
 def test_a_tails_file_keeps_what_its_own_file_says_of_its_mass(written, tmp_path):
     heavy = replace(load_aircraft("cdrw"), mass=4.4)
     files = {"cdrw": load_aircraft("cdrw")}
