@@ -127,7 +127,7 @@ class _AircraftFiles:
         if aircraft.geometry == first.geometry:
             return ""
         return (
-            f"{entry.aircraft}: is named {aircraft.name} as {file} is, but has another geometry, so that their "
+            f"{entry.aircraft}: names its aircraft {aircraft.name!r} like {file}, but has another geometry, so that "
             "coefficients cannot be compared; give it another name, or the same geometry"
         )
 

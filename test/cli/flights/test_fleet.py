@@ -157,7 +157,7 @@ def test_files_of_one_type_may_differ_in_all_but_the_geometry(
     assert warning in capsys.readouterr().err
     found = json.loads((tmp_path / "out" / "fleet.json").read_text())
     (refusal,) = found["refusals"]
-    assert "is named made as " in refusal["reason"]
+    assert "names its aircraft 'made' like " in refusal["reason"]
     assert "another geometry" in refusal["reason"]
 
 
