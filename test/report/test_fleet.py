@@ -103,6 +103,8 @@ def test_where_too_few_tails_are_compared_the_page_says_so(written, tmp_path):
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert said in page
     assert "too few tails to compare it with" in page
+    assert "No tail drifts. Too few tails to compare one with the others. No flight was diagnosed, so" in page
+    assert "None stands out" not in page
 
 
 def test_a_tails_file_keeps_what_its_own_file_says_of_its_mass(written, tmp_path):
