@@ -112,9 +112,11 @@ def _identified(flight: FlightFile, settings: FleetSettings) -> _Estimated:
     fit, rows = found.identification.fit, found.derivatives
     places = [i for i, name in enumerate(fit.estimates) if name in rows]
     names = tuple(name for name in fit.estimates if name in rows)
-    covariance = fit.covariance[np.ix_(places, places)]
+    systematic = np.zeros_like(fit.covariance) if fit.systematic.covariance is None else fit.systematic.covariance
+    kept = np.ix_(places, places)
+    total, statistical = fit.covariance[kept], (fit.covariance - systematic)[kept]
     values, valid = np.array([rows[name].value for name in names]), np.array([rows[name].valid for name in names], bool)
-    return _known(found.run.data.seconds, names, values, covariance, covariance, valid, found.write)
+    return _known(found.run.data.seconds, names, values, total, statistical, valid, found.write)
 
 
 def _known(

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from sysid_node.aircraft.model import Aircraft
 from sysid_node.api.fleet_flight import check_settings, estimate_flight
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.fleet.assembly import assembled
 from sysid_node.fleet.catalogue.catalogue import Catalogue
 from sysid_node.fleet.catalogue.locations import is_remote
@@ -62,7 +64,8 @@ def run_fleet(
 
     ``inputs``: paths that ``out`` must not hold. ``say`` is called with the address of the workers' dashboard, and
     ``progress`` with the share done (0..1) and the flight that came back last. Raises InputError where settings are
-    wrong, another run uses the folder, it cannot be written, or no worker is found.
+    wrong, another run uses the folder, it cannot be written, or no worker is found. Warns (InputWarning) of aircraft
+    files of one type that differ, and of maintenance of tails that are not there.
     """
     check_settings(settings)
     out = Path(out)
@@ -89,10 +92,31 @@ def run_fleet(
 
 def _report(plan: Plan, state: FleetState, catalogue: Catalogue) -> FleetReport:
     """What all flights that are done tell together."""
-    results = assembled(plan, state)
-    loaded = (plan.aircraft_of(flight) for flight in catalogue.flights)
-    files = {aircraft.name: aircraft for aircraft in loaded if aircraft is not None}
-    return FleetReport(results, summarise(results, files), files)
+    results, files = assembled(plan, state), plan.type_files()
+    of_flights = {flight.flight: plan.aircraft_of(flight) for flight in catalogue.flights}
+    of_tails = {(flight.aircraft, flight.tail): of_flights[flight.flight] for flight in results.flights}  # the last
+    known = {key: aircraft for key, aircraft in of_tails.items() if aircraft is not None}
+    _warn_of_files(files, known)
+    _warn_of_notes(results)
+    return FleetReport(results, summarise(results, files), files, known)
+
+
+def _warn_of_files(files: Mapping[str, Aircraft], of_tails: Mapping[tuple[str, str], Aircraft]) -> None:
+    """Warn (InputWarning) where a type's files state different derivatives."""
+    for name, aircraft in files.items():
+        stated = {each for (kind, _), tail in of_tails.items() if kind == name for each in tail.derivatives}
+        if left := sorted(stated - set(aircraft.derivatives)):
+            text = f"the files of type {name} do not state {', '.join(left)} alike: not compared with the flights"
+            warnings.warn(text, InputWarning, stacklevel=3)
+
+
+def _warn_of_notes(results: FleetResults) -> None:
+    """Warn (InputWarning) of maintenance of a tail that no flight with a result has."""
+    tails = {(flight.aircraft, flight.tail) for flight in results.flights}
+    for note in results.maintenance:
+        if not any(note.concerns(*tail) for tail in tails):
+            text = f"maintenance of {note.tail} on {note.date:%Y-%m-%d} ({note.text}): no flight of such a tail has a"
+            warnings.warn(f"{text} result; is the tail's name right?", InputWarning, stacklevel=3)
 
 
 @contextmanager
@@ -111,7 +135,7 @@ def planned(catalogue: Catalogue, out: str | Path, settings: FleetSettings) -> I
 def write_results(folder: Path, found: FleetReport, settings: FleetSettings) -> None:
     """Write the page, the tables, the tails' aircraft files and ``fleet.json``. Raises OSError, InputError."""
     write_tables(folder, found.results)
-    fleet_report.write(found.results, found.summary, folder, found.files)
+    fleet_report.write(found.results, found.summary, folder, found.files, found.tail_files)
     content = {**document(found.results, settings.as_dict()), "summary": found.summary.to_json()}
     text = json.dumps(content, indent=2, ensure_ascii=False, default=str)
     (folder / SUMMARY).write_text(text + "\n", encoding="utf-8")

@@ -75,9 +75,9 @@ def check_limits(manoeuvre: Manoeuvre, aircraft: Aircraft) -> None:
     """Raises InputError, naming control, time and limit, where a deflection from trim passes the control's limit."""
     for name, limit in control_limits(aircraft).items():
         size = np.abs(manoeuvre.deflections[name])
-        worst = int(size.argmax())
+        worst, unit = int(size.argmax()), "" if name == THROTTLE else " rad"
         if size[worst] > limit * (1 + 1e-9):
             raise InputError(
-                f"manoeuvre {manoeuvre.spec!r}: {name} moves {size[worst]:.4g} from trim at "
-                f"{manoeuvre.time[worst]:.2f} s, but {aircraft.name}'s limit is {limit:g}; lower the amplitude"
+                f"manoeuvre {manoeuvre.spec!r}: {name} moves {size[worst]:.4g}{unit} from trim at "
+                f"{manoeuvre.time[worst]:.2f} s, but {aircraft.name}'s limit is {limit:g}{unit}; lower the amplitude"
             )

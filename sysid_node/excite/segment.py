@@ -91,9 +91,18 @@ def draw_manoeuvre(
     return manoeuvre
 
 
-def check_steps(segments: Sequence[ManoeuvreSegment], rate: float) -> None:
-    """Raise InputError where a step is shorter than two samples at a rate (Hz): it would be drawn as another one."""
+def check_sampling(segments: Sequence[ManoeuvreSegment], rate: float) -> None:
+    """Raise InputError where a step is shorter than two samples at a rate (Hz), or a frequency above half of it.
+
+    It would be drawn as another one.
+    """
     for segment in segments:
+        highest = segment.values.get("high", 0.0)
+        if highest > rate / 2:
+            raise InputError(
+                f"manoeuvre {segment.text()!r}: {highest:g} Hz cannot be drawn at {rate:g} Hz; sample at least twice "
+                "as fast, or lower high"
+            )
         width = segment.values.get("width")
         if width is not None and width * rate < _STEP_SAMPLES - 1e-9:
             raise InputError(
@@ -111,10 +120,5 @@ def _time_base(spec: str, segments: Sequence[ManoeuvreSegment], rate: float, dur
         raise InputError(
             f"manoeuvre {spec!r}: {total:g} s at {rate:g} Hz; expected 1 to 10000 Hz, at most {_MOST_SAMPLES} samples"
         )
-    highest = max(segment.values.get("high", 0.0) for segment in segments)
-    if highest > rate / 2:
-        raise InputError(
-            f"manoeuvre {spec!r}: {highest:g} Hz cannot be drawn at {rate:g} Hz; sample at least twice as fast"
-        )
-    check_steps(segments, rate)
+    check_sampling(segments, rate)
     return np.asarray(np.arange(round(total * rate) + 1) / rate)

@@ -26,6 +26,9 @@ DEFAULT_SHARE = 0.15
 #: Share of the throttle's way from level flight to its nearer end that its amplitude is at most, where none is given.
 _ROOM = 0.9
 
+#: Largest seed: larger ones are no longer told apart as floating-point numbers.
+_LARGEST_SEED = 2**53
+
 #: A plus sign joins segments where a kind follows it; in a number such as 1e+1 it does not.
 _JOIN = re.compile(rf"\+(?=\s*(?:{'|'.join(KINDS)})\s*(?::|\+|$))")
 
@@ -81,6 +84,9 @@ def _segment(
             raise _error(text, f"{key!r} is no key of {kind}; expected {', '.join(expected)}", key, expected)
     values = {key: _number(text, key, given.get(key), default) for key, default in known.items()}
     _check(text, values)
+    length = KINDS[kind].length(values)
+    if values["repeat"] > 1 and 0.0 < values["every"] < length * (1.0 - 1e-9):
+        raise _error(text, f"every is {values['every']:g} s, but it lasts {length:g} s; begin again after its end")
     said = given.get("amplitude")
     if said is None:
         return ManoeuvreSegment(
@@ -187,5 +193,7 @@ def _throttle_left(aircraft: Aircraft, airspeed: float | None) -> float:
 def _check(text: str, values: Mapping[str, float]) -> None:
     if values["repeat"] != int(values["repeat"]) or values["repeat"] > 1000:
         raise _error(text, f"repeat is {values['repeat']:g}, expected a whole number, at most 1000")
+    if values.get("seed", 0.0) != int(values.get("seed", 0.0)) or values.get("seed", 0.0) > _LARGEST_SEED:
+        raise _error(text, f"seed is {values['seed']:g}, expected a whole number, at most {_LARGEST_SEED:g}")
     if "high" in values and values["high"] <= values["low"]:
         raise _error(text, f"high is {values['high']:g} Hz, expected more than low, {values['low']:g} Hz")

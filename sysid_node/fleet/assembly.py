@@ -38,7 +38,7 @@ def _result(plan: Plan, flight: CatalogueFlight, entry: FlightEntry | None) -> F
     date = flight.date or (outcome.date if outcome is not None else None)
     aircraft = plan.aircraft_of(flight)
     name = aircraft.name if aircraft is not None else flight.aircraft
-    reason = flight.fault or (entry.reason if entry is not None else NOT_RUN)
+    reason = plan.fault_of(flight) or (entry.reason if entry is not None else NOT_RUN)
     if not reason and (not tail or date is None):
         reason = f"{flight.flight}: {NO_DATE if tail else NO_TAIL}"
     if reason or outcome is None or entry is None or date is None:
@@ -57,4 +57,5 @@ def _result(plan: Plan, flight: CatalogueFlight, entry: FlightEntry | None) -> F
         valid=outcome.valid,
         gap=entry.gap,
         report=entry.report,
+        remarks=entry.remarks,
     )

@@ -22,7 +22,8 @@ class FlightResult:
     ``covariance`` (n, n) the covariance of all their errors; ``statistical_covariance`` (n, n) is the part that
     another flight of the same aircraft draws anew. A covariance has the product of two estimates' units; per radian
     as everywhere. ``gap`` is the content of the flight's ``gap.json``, None where it was not diagnosed, and ``report``
-    the path of the flight's own report relative to the fleet's folder, None where it has none.
+    the path of the flight's own report relative to the fleet's folder, None where it has none. ``remarks`` are what the
+    command of a single flight would have warned of.
     """
 
     flight: str
@@ -38,6 +39,7 @@ class FlightResult:
     valid: np.typing.NDArray[np.bool_]
     gap: Mapping[str, Any] | None
     report: str | None
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Raise ValueError where shapes differ or the date has no time zone."""

@@ -26,6 +26,7 @@ FLIGHTS: Columns = {
     "valid": pa.int64(),
     "verdict": _TEXT,
     "report": _TEXT,
+    "remarks": _TEXT,
 }
 ESTIMATES: Columns = {
     **_OF_FLIGHT,
@@ -97,7 +98,7 @@ def _of_flight(flight: FlightResult) -> tuple[Any, ...]:
 def _flight_row(flight: FlightResult) -> Row:
     verdict = None if flight.gap is None else flight.gap["verdict"]
     counts = len(flight.names), int(np.count_nonzero(flight.valid))
-    return (*_of_flight(flight), flight.data_seconds, *counts, verdict, flight.report)
+    return (*_of_flight(flight), flight.data_seconds, *counts, verdict, flight.report, "; ".join(flight.remarks))
 
 
 def _estimate_rows(flight: FlightResult) -> Iterator[Row]:

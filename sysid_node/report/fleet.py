@@ -21,14 +21,19 @@ TAILS = "tails"
 
 
 def write(
-    results: FleetResults, summary: FleetSummary, folder: Path, files: Mapping[str, Aircraft] | None = None
+    results: FleetResults,
+    summary: FleetSummary,
+    folder: Path,
+    files: Mapping[str, Aircraft] | None = None,
+    tail_files: Mapping[tuple[str, str], Aircraft] | None = None,
 ) -> None:
     """Write ``report.html``, the tables, and ``tails/<tail>.yaml`` for every tail whose type has a file in ``files``.
 
+    ``tail_files``: by type and tail the file from which a tail's own is made, where it is not the type's.
     Where two types have a tail of one name, its file is ``tails/<type>-<tail>.yaml``.
     The folder must be there; files of the same names are replaced. Raises InputError where one cannot be written.
     """
-    report = FleetReport(results, summary, files or {})
+    report = FleetReport(results, summary, files or {}, tail_files or {})
     try:
         write_fleet_report(folder / "report.html", report)
         write_fleet_tables(folder, report)
@@ -39,9 +44,10 @@ def write(
 
 def _write_tails(folder: Path, report: FleetReport) -> None:
     for (aircraft, tail), priors in report.summary.priors.items():
-        if aircraft in report.files:
+        file = report.tail_files.get((aircraft, tail), report.files.get(aircraft))
+        if file is not None:
             folder.mkdir(exist_ok=True)
-            text = dump_aircraft(tail_aircraft(report.files[aircraft], tail, priors))
+            text = dump_aircraft(tail_aircraft(file, tail, priors))
             name = f"{aircraft}-{tail}" if report.summary.is_ambiguous(tail) else tail
             (folder / f"{file_name(name)}.yaml").write_text(text, encoding="utf-8")
 

@@ -15,9 +15,9 @@ CDRW = load_aircraft("cdrw")
 def test_limits_are_the_aircrafts():
     assert control_limits(CDRW) == {"elevator": 0.35, "aileron": 0.35, "rudder": 0.35, "throttle": 1.0}
     parse_manoeuvre("pulse:elevator:amplitude=0.35", CDRW)
-    with pytest.raises(InputError, match=r"elevator moves 0.36 from trim at 1.00 s, but cdrw's limit is 0.35"):
+    with pytest.raises(InputError, match=r"elevator moves 0.36 rad from trim at 1.00 s, but cdrw's limit is 0.35 rad"):
         parse_manoeuvre("pulse:elevator:amplitude=0.36", CDRW)
-    with pytest.raises(InputError, match=r"elevator moves 0.4 from trim"):
+    with pytest.raises(InputError, match=r"elevator moves 0.4 rad from trim"):
         parse_manoeuvre("pulse:elevator:amplitude=0.2+doublet:elevator:amplitude=0.2", CDRW)
     without = replace(CDRW, throttle=None)
     with pytest.raises(InputError, match="no control 'throttle'"):

@@ -61,6 +61,13 @@ MISTAKES = [
     ("doublet:elevator:amplitude=0.1:width=0", "width is 0, expected above zero (s)"),
     ("doublet:elevator:amplitude=0.1:start=-1", "start is -1, expected not negative (s)"),
     ("doublet:elevator:amplitude=0.1:repeat=1.5", "repeat is 1.5, expected a whole number"),
+    (
+        "doublet:elevator:amplitude=0.1:repeat=2:every=0.9",
+        "every is 0.9 s, but it lasts 1 s; begin again after its end",
+    ),
+    ("random:elevator:amplitude=0.1:seed=1.5", "seed is 1.5, expected a whole number"),
+    ("random:elevator:amplitude=0.1:seed=1e30", "seed is 1e+30, expected a whole number, at most 9.0072e+15"),
+    ("doublet:elevator:amplitude=5", "elevator moves 5 rad from trim at 1.00 s, but cdrw's limit is 0.35 rad"),
     ("sweep:elevator:amplitude=0.1:low=2:high=1", "high is 1 Hz, expected more than low, 2 Hz"),
     ("sweep:elevator:amplitude=0.1:high=60", "60 Hz cannot be drawn at 100 Hz"),
     ("multisine:elevator:amplitude=0.1:length=0.1", "no harmonic of 1/0.1 s"),

@@ -95,6 +95,26 @@ def test_each_tail_has_an_aircraft_file_with_the_fleets_values(written):
     assert (read.derivatives["Cl_da"].value, read.derivatives["Cl_da"].tolerance) == (prior.value, prior.tolerance)
 
 
+def test_where_too_few_tails_are_compared_the_page_says_so(written, tmp_path):
+    said = "No tail is compared here: that takes three other tails"
+    assert said not in (written[0] / "report.html").read_text(encoding="utf-8")
+    results = FleetResults(tuple(fleet(tails=3)), (), ())
+    write(results, summarise(results), tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert said in page
+    assert "too few tails to compare it with" in page
+    assert "No tail drifts. Too few tails to compare one with the others. No flight was diagnosed, so" in page
+    assert "None stands out" not in page
+
+
+def test_a_tails_file_keeps_what_its_own_file_says_of_its_mass(written, tmp_path):
+    heavy = replace(load_aircraft("cdrw"), mass=4.4)
+    files = {"cdrw": load_aircraft("cdrw")}
+    write(written[1], written[2], tmp_path, files, {("cdrw", "t3"): heavy})
+    masses = [load_aircraft(tmp_path / "tails" / f"{tail}.yaml").mass for tail in ("t2", "t3")]
+    assert masses == [4.0, 4.4]
+
+
 def test_a_drift_in_a_technicians_words(written):
     drift = written[2].drifts["cdrw", "t3", "Cl_da"]
     course = replace(drift.course, kind="step", since=START.timestamp() / DAY)

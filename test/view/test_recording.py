@@ -243,3 +243,20 @@ def test_other_commands_do_not_load_the_viewer(command: str) -> None:
     code = f"import sys, sysid_node.cli.flights.{command}; print('rerun' in sys.modules, 'pyarrow' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False"]
+
+
+def test_what_cannot_be_shown_says_what_can(tmp_path, capsys):
+    for name, content in (("manoeuvre", '{"manoeuvre": "3211"}'), ("run", '{"aircraft": "cdrw", "method": "iv_rft"}')):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "summary.json").write_text(content)
+    for words, said in (
+        (["absent"], "absent: does not exist; give a folder that a command wrote, or a bag or log"),
+        (["manoeuvre"], f"show its predicted flight: {tmp_path / 'manoeuvre' / 'flight'} with --aircraft FILE|NAME"),
+        (["run", "--topic", "imu/data:=/imu"], "run: is a run, to which --topic and --body-frame do nothing"),
+        (["run", "--body-frame", "frd"], "run: is a run, to which --topic and --body-frame do nothing"),
+    ):
+        path = str(tmp_path / words[0])
+        assert main(["view", path, *words[1:], "--save", str(tmp_path / "x.rrd")]) == BAD_INPUT
+        error = capsys.readouterr().err
+        assert said in error
+        assert len(error.splitlines()) == 1

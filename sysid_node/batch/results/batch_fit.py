@@ -29,6 +29,7 @@ class SystematicPart:
 
     servos: Mapping[str, ParameterEstimate] = field(default_factory=dict)  # by control: how late it follows, s
     budget: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # shares of each variance by source
+    covariance: Array | None = None  # (P, P) the part of the fit's covariance that they make
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,7 @@ def with_systematic_errors(
         fit,
         estimates=estimates,
         covariance=fit.covariance + systematic,
-        systematic=SystematicPart(servos(posterior), budget),
+        systematic=SystematicPart(servos(posterior), budget, systematic),
     )
 
 

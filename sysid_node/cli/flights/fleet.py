@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: What the command needs besides the packages of every command.
 _PACKAGES = ("dask", "distributed", "fsspec", "pyarrow")
-_SHOWN = 10  # refusals that are printed; the table holds all
+_SHOWN = 10  # refusals, and warnings, that are printed; the tables hold all
 
 
 def add_parser(commands: Commands) -> argparse.ArgumentParser:
@@ -137,6 +137,11 @@ def _show(found: FleetReport, out: Path) -> None:
         print(f"  refused {refusal.flight}: {refusal.reason}")
     if len(results.refusals) > _SHOWN:
         print(f"  and {len(results.refusals) - _SHOWN} more in {out / 'refusals.csv'}")
+    remarks = [(flight.flight, remark) for flight in results.flights for remark in flight.remarks]
+    for flight, remark in remarks[:_SHOWN]:
+        print(f"  warning of {flight}: {remark}")
+    if len(remarks) > _SHOWN:
+        print(f"  and {len(remarks) - _SHOWN} more warnings in {out / 'flights.csv'}")
     for sentence in findings(found):
         print(sentence)
     print(out / "report.html")

@@ -58,8 +58,12 @@ def _live(args: argparse.Namespace) -> None:
 def _scene(args: argparse.Namespace) -> Scene:
     from sysid_node.view.runs import opening  # noqa: PLC0415
 
+    if not args.path.exists():
+        raise InputError(f"{args.path}: does not exist; give a folder that a command wrote, or a bag or log")
     folder = opening.run_folder(args.path)
     if folder is not None:
+        if args.topic or args.body_frame != "flu":
+            raise InputError(f"{args.path}: is a run, to which --topic and --body-frame do nothing; leave them out")
         return opening.scene_of(folder, args.aircraft)
     from sysid_node.api.flight_file import load  # noqa: PLC0415
     from sysid_node.view.runs.bag import scene_of_flight  # noqa: PLC0415

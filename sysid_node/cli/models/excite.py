@@ -52,6 +52,7 @@ def run(args: argparse.Namespace) -> None:
     """Predicts, optimises with ``--optimise``, and writes the results."""
     from sysid_node.report.files.manoeuvre_folder import write_manoeuvre  # noqa: PLC0415  # JAX takes its time
     from sysid_node.report.sections.manoeuvre.plan import beyond_envelope  # noqa: PLC0415
+    from sysid_node.report.sections.manoeuvre.prediction import hardly_seen  # noqa: PLC0415
 
     inputs = options.inputs_of([], args.aircraft)
     with output_folder(args.out, "excite", inputs=inputs, force=args.force) as out:
@@ -61,6 +62,8 @@ def run(args: argparse.Namespace) -> None:
         print(result.prediction.manoeuvre.spec)
         if exceeded := beyond_envelope(result):
             print(f"The flight exceeds the envelope in {', '.join(exceeded)}.")
+        if unseen := hardly_seen(result):
+            print(f"It tells hardly more than the aircraft file of {', '.join(unseen)}.")
         print(args.out / "report.html")
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shlex
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +18,7 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.shared import options
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.flight.bag.writer import STORAGES, write_streams
 from sysid_node.flight.commands import COMMANDS, POSITIONS
 from sysid_node.flight.frames import BODY_FRAMES
@@ -37,8 +39,16 @@ if TYPE_CHECKING:
 _RATE, _HELD_RATE = 200.0, 1000.0
 #: Height above the ground (m) where none is given, for turbulence.
 _HEIGHT = 100.0
+#: Multiple of the file's noise where none is given.
+_NOISE = 1.0
+#: Memory of a step of the integration with its outputs and messages, as measured on flights of 5 and 20 minutes.
+_BYTES_A_STEP = 1800.0
+#: Flow angle (rad) beyond which no file's derivatives describe the flight.
+_TUMBLED = np.pi / 4
 #: Failures that reduce the effect of a surface; a stuck surface does so relative to its command.
 LOSSES = ("control_effectiveness_loss", "stuck_surface")
+#: Effects that begin at a time, with the parameter that says when.
+_BEGINNINGS = {**dict.fromkeys(LOSSES, "onset"), "gust": "start"}
 
 
 def add_parser(commands: Commands) -> argparse.ArgumentParser:
@@ -65,7 +75,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     held = parser.add_mutually_exclusive_group().add_argument
     held("--open-loop", dest="autopilot", action="store_false", help="without the autopilot")
     held("--autopilot", action="store_true", default=True, help="hold attitude and airspeed (default)")
-    add("--noise", type=float, default=1.0, help="of the aircraft file's sensor noise (default: 1)")
+    add("--noise", type=float, default=_NOISE, help="of the aircraft file's sensor noise (default: 1)")
     add("--rate", type=float, default=200.0, help="of the IMU, Hz (default: 200)")
     add("--air-data-rate", type=float, default=100.0, help="Hz (default: 100)")
     add("--actuator-rate", type=float, default=100.0, help="Hz (default: 100)")
@@ -85,6 +95,7 @@ def run(args: argparse.Namespace) -> None:
         truth_path(bag).write_text(json.dumps(_truth(args, sortie), indent=2) + "\n", encoding="utf-8")
     if not args.quiet:
         print(_summary(args.out, sortie, streams))
+    _warn(sortie)
 
 
 def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStream]]:
@@ -99,7 +110,7 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
     if not 0 <= args.seed < 2**63:
         raise InputError(f"--seed {args.seed}: expected a whole number, 0 or more")
     aircraft = load_aircraft(args.aircraft)
-    _check_gusts(args, aircraft)
+    _check_options(args, aircraft)
     recorder = FlightSampler(args.rate, args.air_data_rate, args.actuator_rate, surfaces=args.surfaces)
     command_rate = args.actuator_rate if args.surfaces == "commanded" else None
     rate = max(_HELD_RATE if command_rate else _RATE, args.rate, command_rate or 0.0)
@@ -115,6 +126,7 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
         rotary_gusts=not args.linear_gusts,
         command_rate=command_rate,
     )
+    _check_memory(args.duration, rate)
     plan = _plan(args, simulator, command_rate or rate)
     sortie = fly_sortie(simulator, _deflections(args, simulator, plan), conditions)
     if plan is not None:
@@ -129,22 +141,41 @@ def _beside(recorder: FlightSampler, sortie: Sortie) -> dict[str, JointStream]:
     return {POSITIONS: replace(recorder, surfaces="measured").record(sortie).actuators}
 
 
-def _check_gusts(args: argparse.Namespace, aircraft: Aircraft) -> None:
-    """Raise InputError where an option would change turbulence that is there neither by option, effect nor file.
+def _check_options(args: argparse.Namespace, aircraft: Aircraft) -> None:
+    """Raise InputError where an option would change nothing: an effect states it, or there is no turbulence.
 
     The usual height is no such option: the command that a flight's truth holds states every default.
     """
-    stated = any(effect.partition(":")[0].strip() == "turbulence" for effect in args.effect)
-    if args.turbulence != "none" or stated or "turbulence" in aircraft.effects:
+    from sysid_node.sim.model.parameters import parse  # noqa: PLC0415
+
+    stated = parse(args.effect)
+    for option, given, effect, key in (
+        (f"--turbulence {args.turbulence}", args.turbulence != "none", "turbulence", "intensity"),
+        (f"--noise {args.noise:g}", args.noise != _NOISE, "sensor_noise", "scale"),
+    ):
+        if given and key in stated.get(effect, {}):
+            raise InputError(f"{option}: --effect {effect} states {key}, too; give one of them")
+    if args.turbulence != "none" or "turbulence" in stated or "turbulence" in aircraft.effects:
         return
     said = "--linear-gusts" if args.linear_gusts else f"--height {args.height:g}" if args.height != _HEIGHT else ""
     if said:
         raise InputError(f"{said}: there is no turbulence that it changes; give --turbulence, or leave it out")
 
 
+def _check_memory(duration: float | None, rate: float) -> None:
+    """Raise InputError where a flight of this duration (s), integrated at a rate (Hz), has no room on this machine."""
+    needed = (duration or 0.0) * rate * _BYTES_A_STEP
+    there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if needed > there:
+        raise InputError(
+            f"--duration {duration:g}: takes about {needed / 1e9:.0f} GB of memory at {rate:g} steps a second, and "
+            f"this machine has {there / 1e9:.0f}; fly several shorter flights"
+        )
+
+
 def _plan(args: argparse.Namespace, simulator: Simulator, command_rate: float) -> Manoeuvre | None:
     """The manoeuvre, of which no step is lost between commands at a rate (Hz); None where none is flown."""
-    from sysid_node.excite.segment import check_steps, draw_manoeuvre  # noqa: PLC0415
+    from sysid_node.excite.segment import check_sampling, draw_manoeuvre  # noqa: PLC0415
     from sysid_node.excite.spec import parse_segments  # noqa: PLC0415
 
     duration = args.duration
@@ -153,7 +184,7 @@ def _plan(args: argparse.Namespace, simulator: Simulator, command_rate: float) -
     if not args.manoeuvre:
         return None
     segments = parse_segments(args.manoeuvre, simulator.aircraft, args.airspeed)
-    check_steps(segments, command_rate)
+    check_sampling(segments, command_rate)
     return draw_manoeuvre(segments, simulator.aircraft, simulator.rate, duration)
 
 
@@ -238,6 +269,23 @@ def _command(args: argparse.Namespace) -> str:
         elif value is not None and name != "command":
             words += [option, str(value)]
     return shlex.join(words)
+
+
+def _warn(sortie: Sortie) -> None:
+    """Warn (InputWarning) of effects that begin after the flight, and of a flight that no derivatives describe."""
+    outputs = np.asarray(sortie.flight.outputs)
+    end = (len(outputs) - 1) * sortie.simulator.step
+    for effect, key in _BEGINNINGS.items():
+        begin = sortie.effects.get(effect, {}).get(key, -np.inf)
+        if begin >= end:
+            text = f"effect {effect}: {key}={begin:g} s is not within the flight of {end:g} s, so that it does nothing"
+            warnings.warn(text, InputWarning, stacklevel=2)
+    for angle, words in (("alpha", "angle of attack"), ("beta", "sideslip")):
+        largest = float(np.abs(outputs[:, sortie.simulator.outputs.index(angle)]).max())
+        if largest > _TUMBLED:
+            text = f"the {words} reaches {np.rad2deg(largest):.0f} deg, where derivatives do not describe the flight"
+            warnings.warn(f"{text}; use smaller deflections or effects", InputWarning, stacklevel=2)
+            break
 
 
 def _summary(bag: Path, sortie: Sortie, streams: Streams) -> str:

@@ -25,7 +25,7 @@ def expanded(pattern: str, base: Path) -> list[str]:
     A path without such marks is itself. Raises InputError where an address cannot be opened.
     """
     if is_remote(pattern):
-        if not _has_marks(pattern):
+        if not has_marks(pattern):
             return [pattern]
         system, path = _remote(pattern)
         try:
@@ -33,7 +33,7 @@ def expanded(pattern: str, base: Path) -> list[str]:
         except Exception as error:  # every file system raises its own exceptions
             raise _unreadable(pattern, error) from error
     whole = base / Path(pattern).expanduser()
-    if exists(str(whole)) or not _has_marks(pattern):
+    if exists(str(whole)) or not has_marks(pattern):
         return [str(whole)]
     anchor = Path(whole.anchor)
     return sorted(str(path) for path in anchor.glob(str(whole.relative_to(anchor))))
@@ -93,7 +93,8 @@ def local_copy(location: str, cache: Path) -> Path:
     return folder / name
 
 
-def _has_marks(pattern: str) -> bool:
+def has_marks(pattern: str) -> bool:
+    """Whether a path is a pattern: whether it has ``*``, ``?`` or ``[``."""
     return any(mark in pattern for mark in "*?[")
 
 

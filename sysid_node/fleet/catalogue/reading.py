@@ -67,9 +67,13 @@ def _is_yaml(path: Path, text: str) -> bool:
 
 
 def _csv_rows(path: Path, text: str) -> Iterator[_Row]:
-    lines = csv.reader(text.splitlines())
+    """The entries of a table whose columns are separated by commas, or by semicolons as some spreadsheets write it."""
+    first = next(iter(text.splitlines()), "")
+    lines = csv.reader(text.splitlines(), delimiter=";" if ";" in first and "," not in first else ",")
     header = [name.strip().lower() for name in next(lines, [])]
     _check_keys(header, f"catalogue {path}, line 1")
+    if twice := [name for name, count in Counter(header).items() if count > 1]:
+        raise InputError(f"catalogue {path}, line 1: column {twice[0]!r} is there twice; keep one")
     if "path" not in header:
         raise InputError(f"catalogue {path}: line 1: column 'path' is missing; its columns may be {', '.join(KEYS)}")
     for number, cells in enumerate(lines, start=2):
@@ -156,7 +160,7 @@ def _flights(row: _Row, base: Path, aircraft: str) -> Iterator[CatalogueFlight]:
     entry = CatalogueFlight("", row["path"], chosen, row["tail"], "", row["configuration"])
     try:
         entry = replace(entry, date=date_of(row["date"]) if row["date"] else None)
-        found = locations.expanded(row["path"], base)
+        found = _of_pattern(row["path"], locations.expanded(row["path"], base))
     except ValueError as error:
         yield replace(entry, flight=row["flight"] or row["path"], fault=f"{row.where}: {error}")
         return
@@ -169,6 +173,17 @@ def _flights(row: _Row, base: Path, aircraft: str) -> Iterator[CatalogueFlight]:
         if row["flight"] and len(found) > 1:
             name = f"{row['flight']}/{_short(location, base)}"
         yield replace(entry, flight=name, location=location, fault=fault or _fault_at(location))
+
+
+def _of_pattern(pattern: str, found: list[str]) -> list[str]:
+    """What a pattern matches, without files that are no flights, files of bags, and folders of flights."""
+    if found == [pattern] or not locations.has_marks(pattern):
+        return found
+    bags = {path for path in found if not locations.is_remote(path) and (Path(path) / "metadata.yaml").is_file()}
+    kept = [path for path in found if not bags.intersection(map(str, Path(path).parents))]
+    flights = [path for path in kept if path in bags or Path(path).suffix.lower() not in _SKIPPED]
+    folders = {str(folder) for path in flights for folder in Path(path).parents}
+    return [path for path in flights if path not in folders]
 
 
 def _aircraft_path(given: str, base: Path) -> str:

@@ -15,11 +15,15 @@ from sysid_node.fleet.statistics.summary import FleetSummary, TailDeviation
 
 @dataclass(frozen=True)
 class FleetReport:
-    """Results, summary, and the aircraft files of the types where they are known."""
+    """Results, summary, and the aircraft files of the types where they are known.
+
+    ``tail_files``: by type and tail the file of a tail's last flight, where it is not the type's.
+    """
 
     results: FleetResults
     summary: FleetSummary
     files: Mapping[str, Aircraft] = field(default_factory=dict)
+    tail_files: Mapping[tuple[str, str], Aircraft] = field(default_factory=dict)
 
     @cached_property
     def drifts(self) -> list[Drift]:

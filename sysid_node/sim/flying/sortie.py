@@ -90,15 +90,15 @@ def fly_sortie(simulator: Simulator, deflections: Array, conditions: SortieCondi
 
 
 def _all_effects(conditions: SortieConditions) -> dict[str, dict[str, float]]:
-    """The effects asked for, and turbulence and noise of the conditions where these effects are not given."""
+    """The effects asked for, and turbulence and noise of the conditions where these parameters are not given."""
     requested = conditions.effects if isinstance(conditions.effects, Mapping) else parse(conditions.effects)
     effects = {name: dict(values) for name, values in requested.items()}
     if conditions.turbulence not in INTENSITIES:
         raise InputError(f"turbulence {conditions.turbulence!r}: expected one of {', '.join(INTENSITIES)}")
     intensity = INTENSITIES[conditions.turbulence]
     for name, key, value in (("turbulence", "intensity", intensity), ("sensor_noise", "scale", conditions.noise)):
-        if value and name not in effects:
-            effects[name] = {key: value}
+        if value:
+            effects.setdefault(name, {}).setdefault(key, value)
     return effects
 
 

@@ -88,8 +88,10 @@ def model_of(aircraft: Aircraft) -> AircraftNumbers:
     inertia = aircraft.inertia
     moments = np.array([inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz])
     if not np.isfinite(moments).all():
+        missing = [name for name, value in vars(inertia).items() if not np.isfinite(value)]
         raise InputError(
-            f"aircraft {aircraft.name!r}: inertia {inertia}: simulation needs Ixx, Iyy, Izz and Ixz; complete the file"
+            f"aircraft {aircraft.name!r}: inertia without {', '.join(missing)}: simulation needs Ixx, Iyy, Izz and "
+            "Ixz; complete the file"
         )
     lift, alpha = reference_flight(aircraft)
     geometry, throttle = aircraft.geometry, aircraft.throttle

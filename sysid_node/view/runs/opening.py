@@ -17,6 +17,10 @@ def scene_of(path: Path, aircraft: str | None) -> Scene:
     ``aircraft``: an aircraft file or a name; by default the run's own, where it is one that is shipped.
     """
     kind, content = kind_of(path)
+    if kind == "manoeuvre":
+        raise InputError(
+            f"{path}: is a designed manoeuvre; show its predicted flight: {path / 'flight'} with --aircraft FILE|NAME"
+        )
     chosen = aircraft_for(aircraft, content.get("aircraft", ""))
     if kind == "gap":
         from sysid_node.view.runs.gap_run import scene_of_gap  # noqa: PLC0415

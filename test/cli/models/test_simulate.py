@@ -128,6 +128,12 @@ def test_the_truth_of_a_failure(tmp_path, effects, surfaces, begin, changes):
         (["--linear-gusts"], "there is no turbulence that it changes; give --turbulence, or leave it out"),
         (["--manoeuvre", "3211:throttle:amplitude=0.2"], "throttle reaches -0.05616 at 2.50 s, but cdrw allows 0 to 1"),
         (["--manoeuvre", "3211:elevator:width=0.005"], "steps of 0.005 s cannot be drawn at 100 Hz"),
+        (["--manoeuvre", "sweep:elevator:high=40", "--actuator-rate", "50"], "40 Hz cannot be drawn at 50 Hz"),
+        (
+            ["--turbulence", "light", "--effect", "turbulence:intensity=2"],
+            "--turbulence light: --effect turbulence states intensity, too; give one of them",
+        ),
+        (["--noise", "2", "--effect", "sensor_noise:scale=3"], "--noise 2: --effect sensor_noise states scale, too"),
         (["--seed", "-1"], "expected a whole number, 0 or more"),
         (["--effect", "actuator_lga:time_constant=0.1"], "did you mean 'actuator_lag'?"),
         (["--effect", "mass_error:eror=0.1"], "did you mean 'error'?"),
@@ -135,6 +141,7 @@ def test_the_truth_of_a_failure(tmp_path, effects, surfaces, begin, changes):
         (["--effect", "imu_delay:delay=0.1", "--effect", "imu_delay:delay=0.2"], "'imu_delay' is given twice"),
         (["--rate", "0"], "expected"),
         (["--duration", "-1"], "expected 0.1 to 36000 s"),
+        (["--duration", "36000", "--rate", "5000"], "takes about 324 GB of memory at 5000 steps a second, and"),
         (["--aircraft", "nobody"], "nobody"),
     ],
 )
@@ -188,3 +195,20 @@ def test_with_and_without_the_autopilot_is_a_contradiction(tmp_path, capsys):
         main(["simulate", "--aircraft", "cdrw", "--open-loop", "--autopilot", "--out", str(tmp_path / "bag")])
     assert stop.value.code == 2
     assert "--autopilot: not allowed with argument --open-loop" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["stuck_surface:elevator=1:onset=9"], "onset=9 s is not within the flight of 1 s, so that it does nothing"),
+        (["gust:down=3:start=1"], "start=1 s is not within the flight of 1 s"),
+        (["derivative_error:Cm_alpha=8"], "deg, where derivatives do not describe the flight"),
+        (["gust:down=1:start=0.5"], ""),
+    ],
+)
+def test_what_was_not_flown_as_it_was_asked_for_is_a_warning(tmp_path, capsys, options, said):
+    words = ["--aircraft", "cdrw", "--duration", "1", "--out", str(tmp_path / "bag"), "--effect", *options]
+    assert main(["simulate", *words]) == 0
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("warning:") == bool(said)

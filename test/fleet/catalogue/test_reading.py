@@ -36,6 +36,27 @@ def test_a_table_with_a_pattern_a_note_and_a_log_that_is_missing(tmp_path: Path)
     assert (note.tail, note.date.day, note.text) == ("7", 10, "aileron servo replaced")
 
 
+def test_a_pattern_passes_over_what_is_no_flight(tmp_path: Path) -> None:
+    logs(tmp_path, "7/a.csv", "7/a.truth.json", "7/notes.txt", "7/bag/bag_0.mcap", "7/bag/metadata.yaml")
+    (tmp_path / "7" / "a.truth.json").write_text("{}")
+    (tmp_path / "fleet.csv").write_text("path,aircraft,tail\n7/*,cdrw,7\n7/*/*,cdrw,7\n7/a.truth.json,cdrw,8\n")
+    found = read_catalogue(tmp_path / "fleet.csv").flights
+    assert [flight.flight for flight in found] == ["7/a.csv", "7/bag", "7/bag/bag_0.mcap", "7/a.truth.json"]
+    assert "is no flight that can be read" in found[3].fault
+    (tmp_path / "all.csv").write_text("path,aircraft,tail\n**/*,cdrw,7\n")
+    assert [f.flight for f in read_catalogue(tmp_path / "all.csv").flights if "7" in f.flight] == ["7/a.csv", "7/bag"]
+
+
+def test_a_table_with_semicolons_and_one_with_a_column_twice(tmp_path: Path) -> None:
+    logs(tmp_path, "a.csv")
+    (tmp_path / "fleet.csv").write_text("path;aircraft;tail;maintenance\na.csv;cdrw;7;\n")
+    (flight,) = read_catalogue(tmp_path / "fleet.csv").flights
+    assert (flight.flight, flight.aircraft, flight.tail) == ("a.csv", "cdrw", "7")
+    (tmp_path / "fleet.csv").write_text("path,tail,path\na.csv,7,b.csv\n")
+    with pytest.raises(InputError, match="column 'path' is there twice; keep one"):
+        read_catalogue(tmp_path / "fleet.csv")
+
+
 def test_yaml_with_a_default_aircraft_file_beside_it(tmp_path: Path) -> None:
     logs(tmp_path, "a.csv")
     (tmp_path / "fleet.yaml").write_text(

@@ -197,5 +197,5 @@ def test_divergence_is_one_clear_line(elevator, when):
 
 def test_missing_inertia_is_named(aircraft):
     broken = dataclasses.replace(aircraft, inertia=dataclasses.replace(aircraft.inertia, Ixx=float("nan")))
-    with pytest.raises(InputError, match="simulation needs Ixx"):
+    with pytest.raises(InputError, match="inertia without Ixx: simulation needs Ixx"):
         _ = Simulator(broken).model

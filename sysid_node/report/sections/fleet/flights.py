@@ -37,6 +37,7 @@ def _row(flight: FlightResult, owed: list[float]) -> dict[str, Any]:
         "link": None if flight.report is None else quote(flight.report),
         "configuration": flight.configuration,
         "data": seconds(flight.data_seconds),
+        "remarks": flight.remarks,
         "valid": f"{int(flight.valid.sum())} of {len(flight.names)}",
         "owed": f"{100 * float(np.median(owed)):.0f}\u202f%" if owed else NONE,
         "verdict": str(flight.gap.get("verdict", "")).replace("_", " ") if flight.gap is not None else "",

@@ -29,14 +29,33 @@ def opening(report: FleetReport) -> dict[str, Any]:
         ("Types", ", ".join(summary.tails) or "none"),
         ("Refused", str(len(report.results.refusals))),
     ]
+    warned = sum(bool(flight.remarks) for flight in report.results.flights)
+    if warned:
+        facts.append(("With warnings", str(warned)))
     return {
         "facts": facts,
         "drifting": _shortened(drifting),
         "odd": _shortened([_odd(report, k) for k in range(len(report.odd))]),
         "causes": _shortened(causes),
+        "nothing": "" if drifting or report.odd or causes else _nothing(report),
         "flights": plural(summary.flights, "flight"),
         "tails": plural(tails, "tail"),
     }
+
+
+def _nothing(report: FleetReport) -> str:
+    """What was looked for and not found, and what the flights did not allow to look for."""
+    diagnosed = any(flight.gap is not None for flight in report.results.flights)
+    looked_for = (
+        (report.summary.drifts, "No tail drifts.", "Too few flights of a tail to look for drift."),
+        (report.summary.deviations, "None stands out from its type.", "Too few tails to compare one with the others."),
+        (
+            diagnosed,
+            "No cause of a gap belongs to the simulator or to a tail.",
+            "No flight was diagnosed, so that nothing is said of the simulator.",
+        ),
+    )
+    return " ".join(found if possible else not_possible for possible, found, not_possible in looked_for)
 
 
 def _odd(report: FleetReport, k: int) -> str:

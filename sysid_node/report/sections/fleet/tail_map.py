@@ -33,7 +33,8 @@ def _map(report: FleetReport, aircraft: str, tails: tuple[str, ...]) -> dict[str
     names = [population.series.name for population in report.populations(aircraft)]
     heads: list[Markup] = [symbol(name) for name in names]
     rows = [(tail, [_cell(report, aircraft, tail, name) for name in names]) for tail in tails]
-    return {"aircraft": aircraft, "heads": heads, "rows": rows}
+    compared = any(key[0] == aircraft for key in report.summary.deviations)
+    return {"aircraft": aircraft, "heads": heads, "rows": rows, "compared": compared}
 
 
 def _cell(report: FleetReport, aircraft: str, tail: str, name: str) -> Cell:
@@ -47,6 +48,8 @@ def _cell(report: FleetReport, aircraft: str, tail: str, name: str) -> Cell:
         colour = _colour(distance * _sign(report, aircraft, name))
         words.append(f"{number(distance, 2)} standard errors from the other tails")
         text = "\u25cf" if deviation.significant else ""
+    else:
+        words.append("too few tails to compare it with")
     if drift is not None and drift.significant:
         text += "\u25c6"
         words.append(f"changed {change_words(drift)}")
