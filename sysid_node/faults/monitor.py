@@ -200,7 +200,10 @@ def _renew(state: MonitorState, now: Block) -> None:
         state.reference, sum(noise.values()) * state.reference.blocks, state.settings.slack
     )
     believed = state.reference.values + prior.shift
-    each = hypotheses(state.aircraft, state.terms, reference_model.whole(state.reference, prior.shift))
+    commanded = reference_model.commanded(state.reference)
+    each = hypotheses(state.aircraft, state.terms, reference_model.whole(state.reference, prior.shift), commanded)
+    if state.renewed is not None and len(each) != len(state.renewed.each):
+        state.usual.clear()  # it is known only now which controls are commanded
     state.renewed = FaultHypotheses(
         each,
         Shifts([hypothesis.shift for hypothesis in each]),

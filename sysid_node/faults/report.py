@@ -11,7 +11,17 @@ from numpy.typing import NDArray
 from sysid_node.faults.hypotheses.bayes_factors import Weighed
 from sysid_node.faults.hypotheses.catalogue import Hypothesis
 from sysid_node.faults.model.terms import Terms
-from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VANE_OFFSET, DerivativeChange, Fault
+from sysid_node.faults.types import (
+    AIRSPEED,
+    DAMAGE,
+    HARD_OVER,
+    LOSS,
+    SLOWER,
+    STUCK,
+    VANE_OFFSET,
+    DerivativeChange,
+    Fault,
+)
 
 Array = NDArray[np.float64]
 
@@ -36,7 +46,7 @@ def fault_of(hypothesis: Hypothesis, weighed: Weighed, terms: Terms, found: Dete
         return Fault(kind, part, math.nan, math.nan, math.nan, "", *found, changes)
     middle, wide = float(weighed.size[0]), WIDE * math.sqrt(float(weighed.covariance[0, 0]))
     ends = [_reported_size(kind, x) for x in (middle, middle - wide, middle + wide)]
-    unit = "1" if kind in (LOSS, AIRSPEED) else "rad"
+    unit = {LOSS: "1", AIRSPEED: "1", SLOWER: "s"}.get(kind, "rad")
     if kind == STUCK and abs(middle) >= AT_LIMIT * hypothesis.limit:
         kind = HARD_OVER
     return Fault(kind, part, ends[0], min(ends[1:]), max(ends[1:]), unit, *found)

@@ -26,7 +26,7 @@ from sysid_node.faults.model import blocks
 from sysid_node.faults.model.reference_model import IdentifierEstimates
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.state import MonitorState
-from sysid_node.faults.types import ARRIVAL, SILENT, Fault
+from sysid_node.faults.types import ARRIVAL, SILENT, SLOWER, Fault
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online.alignment import streaming as intake
@@ -124,7 +124,9 @@ def present_faults(watch: MessageWatch, now: float) -> list[Fault]:
         for arrived, since in [watch.heard.get(topic, (math.inf, 0.0))]
         if now - arrived > watch.stale_after
     ]
+    estimated = {fault.part for fault in watch.servo_times.faults}
     forces = [watch.state.fault] if watch.state.fault and not silent else []
+    forces = [fault for fault in forces if fault.kind != SLOWER or fault.part not in estimated]
     return [*silent, *watch.off_command, *watch.servo_times.faults, *watch.limits.faults, *forces]
 
 

@@ -15,7 +15,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults import monitor
 from sysid_node.faults.model.blocks import PERIOD, Block
-from sysid_node.faults.model.lagged_controls import LAGS
+from sysid_node.faults.model.lagged_controls import LAGS, shares_of
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.state import MonitorState
 from sysid_node.faults.types import Fault
@@ -43,7 +43,8 @@ class Maker:
     def __init__(self, seed: int, names: tuple[str, ...]) -> None:
         self.random = np.random.default_rng(seed)
         self.names = names
-        self.behind = len(AIRCRAFT.controls) * len(LAGS)
+        self.behind = np.zeros(len(AIRCRAFT.controls) * len(LAGS))
+        self.lateness: dict[str, float] = {}  # s, of the servos of controls that are commanded
         self.count = 0
         self.noise = np.zeros(6)
         self.motion = dict.fromkeys(SIZES, 0.0)
@@ -65,9 +66,15 @@ class Maker:
         row = np.zeros(len(self.names))
         for name, value in measured.items():
             row[OFFSET if name == "0" else self.names.index(name)] = value
+        for place, (name, control) in enumerate(AIRCRAFT.controls.items()):
+            if name in self.lateness:
+                shares, behind = shares_of(self.lateness[name], 0.0)[0], 0.02 * self.random.standard_normal(len(LAGS))
+                self.behind[place * len(LAGS) : (place + 1) * len(LAGS)] = behind
+                for c in COEFFICIENTS:
+                    outputs[COEFFICIENTS.index(c)] += self.values.get(f"{c}_{control.symbol}", 0.0) * shares @ behind
         row[:OUTPUTS] = outputs
         air = np.array([18.0, measured["alpha"], measured["beta"]])
-        return Block(PERIOD * self.count, outputs, row, np.zeros(self.behind), air, 20, self.count > 1)
+        return Block(PERIOD * self.count, outputs, row, self.behind.copy(), air, 20, self.count > 1)
 
 
 def monitored(seed: int, **settings: float) -> tuple[MonitorState, Maker]:

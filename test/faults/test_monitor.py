@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from fault_flights import AIRCRAFT, ONSET, Truth, flown, fly, monitored
+from fault_flights import AIRCRAFT, ONSET, Maker, Truth, flown, fly, monitored
 
 from sysid_node.errors import InputError
 from sysid_node.faults import monitor
@@ -12,7 +12,8 @@ from sysid_node.faults.model import blocks
 from sysid_node.faults.model.blocks import PERIOD
 from sysid_node.faults.model.reference_model import IdentifierEstimate, IdentifierEstimates
 from sysid_node.faults.settings import FaultMonitorSettings
-from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, STUCK, VANE_OFFSET, VANE_STUCK
+from sysid_node.faults.state import MonitorState
+from sysid_node.faults.types import AIRSPEED, DAMAGE, HARD_OVER, LOSS, SLOWER, STUCK, VANE_OFFSET, VANE_STUCK
 
 
 def lost(symbol: str, share: float) -> Truth:
@@ -210,6 +211,52 @@ def test_estimates_that_are_ripe_as_soon_as_it_judges() -> None:
     monitor.receive_estimates(state, 1.0, IdentifierEstimates(known, {}, False))
     assert fly(state, maker, 60.0) is None
     assert state.reference.values[state.terms.names.index("CL_alpha")] == 3.02
+
+
+def commanded(seed: int, lateness: float) -> tuple[MonitorState, Maker]:
+    """A monitor and a maker of flights whose elevator is commanded, after ``ONSET`` s of flight without a fault.
+
+    The identifier says that its servo is late by 0.03 +- 0.006 s; it is late by ``lateness`` s.
+    """
+    state, maker = monitored(seed)
+    maker.lateness["elevator"] = lateness
+    known = {"elevator": IdentifierEstimate(0.03, 0.006, True)}
+    monitor.receive_estimates(state, 1.0, IdentifierEstimates({}, known, False))
+    assert fly(state, maker, ONSET) is None
+    return state, maker
+
+
+@pytest.mark.parametrize("slower", [0.05, 0.1])
+def test_a_servo_that_becomes_slower_is_named_by_how_much(slower: float) -> None:
+    state, maker = commanded(21, 0.03)
+    maker.lateness["elevator"] += slower
+    fault = fly(state, maker, 10.0)
+    assert fault is not None
+    assert (fault.kind, fault.part, fault.unit) == (SLOWER, "elevator", "s"), fault.text
+    assert fault.lower <= slower <= fault.upper
+    assert fault.size == pytest.approx(slower, abs=0.02)
+
+
+def test_a_servo_that_becomes_faster_is_not_slower() -> None:
+    state, maker = commanded(22, 0.035)
+    maker.lateness["elevator"] = 0.0
+    fault = fly(state, maker, 10.0)
+    assert fault is None or fault.kind != SLOWER
+
+
+def test_a_servo_s_error_within_what_is_not_known_of_it_is_no_fault() -> None:
+    """Two standard errors; what is learned of it in flight stands from then on."""
+    state, maker = commanded(23, 0.042)
+    assert fly(state, maker, 20.0) is None
+
+
+def test_half_of_a_commanded_elevator_is_a_loss() -> None:
+    state, maker = commanded(24, 0.03)
+    maker.values = {name: value * (0.5 if name.endswith("_de") else 1.0) for name, value in maker.values.items()}
+    fault = fly(state, maker, 8.0)
+    assert fault is not None
+    assert (fault.kind, fault.part) == (LOSS, "elevator")
+    assert fault.lower <= 0.5 <= fault.upper
 
 
 def test_samples_of_another_rate_or_with_holes_are_averaged_alike() -> None:

@@ -2,15 +2,16 @@
 
 Each fault keeps the equations linear. A surface that lost the share l of its effect loses l of its derivatives. A
 surface that is stuck at an angle loses all of them, and the moments at that angle are added to the offsets. A vane with
-an offset changes the offsets, too. A wrong airspeed scales all terms with dynamic pressure. Every surface and sensor
-has therefore a direction of its own in the space of all derivatives, by which faults are distinguished. Damage is any
-shift of the derivatives of an axis. As a simpler hypothesis, which needs less evidence, it is a change of stiffness, of
-damping, or of both, which a shifted mass or the loss of a part of the tail causes first.
+an offset changes the offsets, too. A servo that becomes slower moves the shares of its lags. A wrong airspeed scales
+all terms with dynamic pressure. Every surface and sensor has therefore a direction of its own in the space of all
+terms, by which faults are distinguished. Damage is any shift of the derivatives of an axis. As a simpler hypothesis,
+which needs less evidence, it is a change of stiffness, of damping, or of both, which a shifted mass or the loss of a
+part of the tail causes first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,14 +20,15 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS, LATERAL, LONGITUDINAL
 from sysid_node.faults.hypotheses.bayes_factors import Shift
+from sysid_node.faults.model.lagged_controls import LAGS, shares_of
 from sysid_node.faults.model.terms import RATES, Terms
-from sysid_node.faults.types import AIRSPEED, DAMAGE, LOSS, SHIFTED, STUCK, VANE_OFFSET
+from sysid_node.faults.types import AIRSPEED, DAMAGE, LOSS, SHIFTED, SLOWER, STUCK, VANE_OFFSET
 
 Array = NDArray[np.float64]
 
-#: Prior standard deviations: share of a surface's effect, angle of a surface (rad), share of dynamic pressure, angle
-#: of a vane (rad), share of a derivative.
-LOST, MOVED, PRESSURE, TURNED, CHANGED = 0.5, 0.1, 0.5, 0.1, 0.5
+#: Prior standard deviations: share of a surface's effect, angle of a surface (rad), lateness of a servo (s), share of
+#: dynamic pressure, angle of a vane (rad), share of a derivative.
+LOST, MOVED, SLOWED, PRESSURE, TURNED, CHANGED = 0.5, 0.1, 0.1, 0.5, 0.1, 0.5
 LIMIT = 0.35  # rad, where the aircraft file gives no limit
 _LIFT, _DRAG = COEFFICIENTS.index("CL"), COEFFICIENTS.index("CD")
 
@@ -40,14 +42,17 @@ class Hypothesis:
     shift: Shift
     limit: float = 0.0  # rad, of a surface's travel
     whole: bool = False  # all derivatives of an axis, which can fit any change
+    one_sided: bool = False  # its size is never negative
 
 
-def hypotheses(aircraft: Aircraft, terms: Terms, reference: Array) -> list[Hypothesis]:
-    """All hypotheses for the reference derivatives (D,)."""
+def hypotheses(aircraft: Aircraft, terms: Terms, reference: Array, commanded: Collection[str] = ()) -> list[Hypothesis]:
+    """All hypotheses for the reference values (D,). Controls that are ``commanded`` follow through a servo."""
     found = []
     for name, control in aircraft.controls.items():
         if terms.of(control.symbol).any():
             found += _of_surface(name, control.symbol, control.limit or LIMIT, terms, reference)
+            if name in commanded:
+                found.append(Hypothesis(SLOWER, name, _slower(name, terms, reference), one_sided=True))
     found.append(Hypothesis(AIRSPEED, "airspeed", _free([_pressure(terms, reference)], [PRESSURE])))
     for vane in ("alpha", "beta"):
         if terms.of(vane).any():
@@ -81,6 +86,14 @@ def _of_surface(name: str, symbol: str, limit: float, terms: Terms, reference: A
         Hypothesis(STUCK, name, Shift(lost, moved[:, None], np.array([limit])), limit),
         Hypothesis(SHIFTED, name, Shift(none, moved[:, None], np.array([MOVED])), limit),
     ]
+
+
+def _slower(name: str, terms: Terms, reference: Array) -> Shift:
+    """The shift by a servo that is one second later, by the chord to one that is ``SLOWED`` later."""
+    servo, _ = terms.servos[name]
+    late, free = float(reference[servo] @ LAGS), np.zeros_like(reference)
+    free[servo] = (shares_of(late + SLOWED, 0.0)[0] - shares_of(late, 0.0)[0]) / SLOWED
+    return _free([free], [SLOWED])
 
 
 def _offsets(regressor: str, terms: Terms, reference: Array) -> Array:

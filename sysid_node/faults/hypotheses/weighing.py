@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
@@ -159,7 +160,7 @@ def explained(state: MonitorState, over: FlightInterval, usual: Array) -> list[W
         if hypothesis.whole:
             one = replace(one, factor=one.factor - LAST_RESORT * abs(one.factor))
         found.append(one)
-    return found
+    return _possible(state, found)
 
 
 def statistics(state: MonitorState, over: FlightInterval) -> Array:
@@ -169,14 +170,22 @@ def statistics(state: MonitorState, over: FlightInterval) -> Array:
 
 def weights(state: MonitorState, over: FlightInterval, usual: Array) -> list[Weighed]:
     """The Bayes factor of each hypothesis; ``usual`` (H,) is the mean of its statistic without a fault."""
-    return weigh_each(over.J, over.v, state.hypotheses.shifts, np.maximum(usual, 1.0))
+    return _possible(state, weigh_each(over.J, over.v, state.hypotheses.shifts, np.maximum(usual, 1.0)))
 
 
 def promising(state: MonitorState, over: FlightInterval, usual: Array, squares: Array, least: float) -> list[Weighed]:
     """As ``weights``, where only factors above ``least`` matter; ``squares`` (H,) are the interval's statistics."""
     usual = np.maximum(usual, 1.0)
     worth = most(state.hypotheses.shifts, squares, usual) > least - MARGIN
-    return weigh_each(over.J, over.v, state.hypotheses.shifts, usual, worth)
+    return _possible(state, weigh_each(over.J, over.v, state.hypotheses.shifts, usual, worth))
+
+
+def _possible(state: MonitorState, found: Sequence[Weighed]) -> list[Weighed]:
+    """The same, where a size with a wrong sign has no support."""
+    return [
+        replace(weighed, factor=-math.inf) if hypothesis.one_sided and weighed.size[0] < 0.0 else weighed
+        for hypothesis, weighed in zip(state.hypotheses.each, found, strict=True)
+    ]
 
 
 def excess(state: MonitorState, over: FlightInterval, place: int, weighed: Weighed) -> float:

@@ -126,6 +126,11 @@ def _adopt(reference: ReferenceModel, d: int, value: float, error: float) -> Non
     reference.values[d], reference.errors[d] = value, error
 
 
+def commanded(reference: ReferenceModel) -> set[str]:
+    """The controls of which the commands are known, and not the positions: the identifier estimates their servos."""
+    return {name for name, (servo, _) in reference.terms.servos.items() if reference.errors[servo].any()}
+
+
 def learn(reference: ReferenceModel, J: Array, v: Array, chosen: NDArray[np.bool_]) -> None:
     """Add the information of a block without a fault about the ``chosen`` terms (D,)."""
     both = np.outer(chosen, chosen)
