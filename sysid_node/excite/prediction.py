@@ -21,6 +21,7 @@ from sysid_node.excite.manoeuvre import THROTTLE, Manoeuvre, check_thrust
 from sysid_node.excite.segment import ManoeuvreSegment, draw_manoeuvre
 from sysid_node.flight.record import FlightRecord
 from sysid_node.sim import RolloutInputs, SimulatedFlight, Simulator
+from sysid_node.sim.compiled.programs import kept
 from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
 from sysid_node.sim.flying.lengths import padded
 from sysid_node.sim.flying.rollout import rollout
@@ -159,7 +160,7 @@ def outputs_of(
 
 
 #: d ``outputs_of`` / d unknowns, (N, 12, unknowns).
-slopes_of = jax.jit(jax.jacfwd(outputs_of, argnums=2), static_argnums=0)
+slopes_of = kept(1)(jax.jacfwd(outputs_of, argnums=2))
 
 
 def _check_travel(aircraft: Aircraft, manoeuvre: Manoeuvre, commands: Array) -> None:

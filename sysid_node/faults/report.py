@@ -40,11 +40,11 @@ class Detection(NamedTuple):
 
 def fault_of(hypothesis: Hypothesis, weighed: Weighed, terms: Terms, found: Detection) -> Fault:
     """The fault of a hypothesis, with its estimated size."""
-    kind, part, freely = hypothesis.kind, hypothesis.part, weighed.size.size == 1
-    if kind == DAMAGE or not freely:
+    kind, part, by = hypothesis.kind, hypothesis.part, np.array(hypothesis.measure)
+    if kind == DAMAGE:
         changes = _changes(hypothesis, weighed, terms)
         return Fault(kind, part, math.nan, math.nan, math.nan, "", *found, changes)
-    middle, wide = float(weighed.size[0]), WIDE * math.sqrt(float(weighed.covariance[0, 0]))
+    middle, wide = float(by @ weighed.size), WIDE * math.sqrt(float(by @ weighed.covariance @ by))
     ends = [_reported_size(kind, x) for x in (middle, middle - wide, middle + wide)]
     unit = {LOSS: "1", AIRSPEED: "1", SLOWER: "s"}.get(kind, "rad")
     if kind == STUCK and abs(middle) >= AT_LIMIT * hypothesis.limit:

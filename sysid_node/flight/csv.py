@@ -9,7 +9,7 @@ import stat
 import warnings
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
@@ -119,6 +119,10 @@ def _numbers(names: list[str], line: int, row: list[str]) -> list[float]:
     """One row; an empty cell is NaN."""
     if len(row) != len(names):
         raise InputError(f"line {line} has {len(row)} cells, expected {len(names)}; was the file cut short?")
+    with suppress(ValueError):  # an empty cell, or one that is no number: cell by cell
+        values = list(map(float, row))
+        if all(map(math.isfinite, values)):
+            return values
     values = []
     for name, cell in zip(names, row, strict=True):
         try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import jax
 import jax.numpy as jnp
@@ -16,8 +16,9 @@ from sysid_node.dynamics.airflow import velocity_of
 from sysid_node.dynamics.atmosphere import altitude_of
 from sysid_node.dynamics.attitude import quaternion
 from sysid_node.errors import InputError
+from sysid_node.sim.compiled.programs import kept
 from sysid_node.sim.effects import SimulationParameter
-from sysid_node.sim.flying.lengths import cut, padded
+from sysid_node.sim.flying.lengths import cut, on_device, padded
 from sysid_node.sim.flying.rollout import RolloutInputs, SimulatedFlight, rollout
 from sysid_node.sim.model import parameters
 from sysid_node.sim.model.layout import OUTPUTS, AircraftNumbers, ParameterLayout, Scalar, layout_of, model_of
@@ -37,10 +38,11 @@ _SPAN = 1.5
 #: Effects by which something sits elsewhere than in the file.
 _PLACES = frozenset({"cg_shift", "imu_lever_arm", "vane_lever_arm", "thrust_line_offset", "thrust_yaw"})
 
-_rollout = jax.jit(rollout, static_argnums=0)
+_rollout = jax.jit(rollout, static_argnums=0)  # that JAX may transform
+_kept_rollout = kept(1)(rollout)
 
 
-@partial(jax.jit, static_argnums=0)
+@kept(1)
 def _jacobian(
     layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, initial: Scalar, inputs: RolloutInputs, step: Scalar
 ) -> Scalar:
@@ -180,12 +182,13 @@ class Simulator:
     ) -> RolloutInputs:
         """Inputs of N samples from commands (N, controls + 1), rad and N; the other series default to zero."""
 
-        def filled(given: Scalar | Array | None, columns: int) -> Scalar:
-            return jnp.zeros((commands.shape[0], columns)) if given is None else jnp.asarray(given)
+        def arrays(values: Scalar | Array) -> Scalar:
+            return on_device(values) if isinstance(values, np.ndarray) else jnp.asarray(values)
 
-        return RolloutInputs(
-            jnp.asarray(commands), filled(gusts, 6), filled(turbulence, 6), filled(noise, len(OUTPUTS))
-        )
+        def filled(given: Scalar | Array | None, columns: int) -> Scalar:
+            return arrays(np.zeros((commands.shape[0], columns)) if given is None else given)
+
+        return RolloutInputs(arrays(commands), filled(gusts, 6), filled(turbulence, 6), filled(noise, len(OUTPUTS)))
 
     def rollout(self, theta: Scalar | Array, initial: Scalar | Array, inputs: RolloutInputs) -> SimulatedFlight:
         """The open-loop flight of parameters (P,) from a state (13,): pure and compiled.
@@ -197,7 +200,7 @@ class Simulator:
         if any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((theta, initial, inputs))):
             flight = _rollout(*fixed, inputs, self.step)
             return flight
-        flight = _rollout(*fixed, padded(inputs), self.step, samples)
+        flight = _kept_rollout(*fixed, padded(inputs), self.step, samples)
         return cut(flight, samples)
 
     def jacobian(self, theta: Scalar | Array, initial: Scalar | Array, inputs: RolloutInputs) -> Scalar:

@@ -172,3 +172,14 @@ main(["gap", "nowhere", "--aircraft", "cdrw"])
     kept = {k: v for k, v in os.environ.items() if k not in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")}
     done = subprocess.run([sys.executable, "-c", program], env=kept, capture_output=True, text=True, check=False)
     assert done.stdout.splitlines()[0] == "at numpy 1"
+
+
+@pytest.mark.parametrize(
+    ("command", "absent"),
+    [("gap", {"scipy", "rich", "jax"}), ("replay", {"rich", "jax", "scipy.signal"})],
+)
+def test_the_help_of_a_command_loads_no_package_that_only_its_run_needs(command: str, absent: set[str]) -> None:
+    code = f"import sys; from sysid_node.cli.main import build_parser; build_parser({command!r}); "
+    code += f"print(sorted({absent!r} & sys.modules.keys()))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

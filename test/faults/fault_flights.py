@@ -15,11 +15,12 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults import monitor
 from sysid_node.faults.model.blocks import PERIOD, Block
-from sysid_node.faults.model.lagged_controls import LAGS, shares_of
+from sysid_node.faults.model.lagged_controls import LAGS, LaggedControls
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.state import MonitorState
 from sysid_node.faults.types import Fault
 from sysid_node.online.frequency.regression_signals import OFFSET, OUTPUTS
+from sysid_node.online.systematic.servo_states import ServoStates
 
 Array = NDArray[np.float64]
 
@@ -43,8 +44,10 @@ class Maker:
     def __init__(self, seed: int, names: tuple[str, ...]) -> None:
         self.random = np.random.default_rng(seed)
         self.names = names
-        self.behind = np.zeros(len(AIRCRAFT.controls) * len(LAGS))
-        self.lateness: dict[str, float] = {}  # s, of the servos of controls that are commanded
+        self.commands = [0.0] * len(AIRCRAFT.controls)
+        self.lateness: dict[str, float] = {}  # s, of the servos of controls that are commanded, of first order
+        self.lagged = LaggedControls(len(AIRCRAFT.controls))
+        self.servos = ServoStates([0.0] * len(AIRCRAFT.controls))
         self.count = 0
         self.noise = np.zeros(6)
         self.motion = dict.fromkeys(SIZES, 0.0)
@@ -66,15 +69,35 @@ class Maker:
         row = np.zeros(len(self.names))
         for name, value in measured.items():
             row[OFFSET if name == "0" else self.names.index(name)] = value
-        for place, (name, control) in enumerate(AIRCRAFT.controls.items()):
-            if name in self.lateness:
-                shares, behind = shares_of(self.lateness[name], 0.0)[0], 0.02 * self.random.standard_normal(len(LAGS))
-                self.behind[place * len(LAGS) : (place + 1) * len(LAGS)] = behind
-                for c in COEFFICIENTS:
-                    outputs[COEFFICIENTS.index(c)] += self.values.get(f"{c}_{control.symbol}", 0.0) * shares @ behind
+        behind, moved = self._servos()
+        for name, late in moved.items():
+            for c in COEFFICIENTS:
+                value = self.values.get(f"{c}_{AIRCRAFT.controls[name].symbol}", 0.0)
+                outputs[COEFFICIENTS.index(c)] += value * late
         row[:OUTPUTS] = outputs
         air = np.array([18.0, measured["alpha"], measured["beta"]])
-        return Block(PERIOD * self.count, outputs, row, self.behind.copy(), air, 20, self.count > 1)
+        return Block(PERIOD * self.count, outputs, row, behind, air, 20, self.count > 1)
+
+    def _servos(self) -> tuple[Array, dict[str, float]]:
+        """What a block's controls are behind by through each lag, and through the servos of those that are commanded.
+
+        Commands step at random every half a second.
+        """
+        late = [self.lateness.get(name, 0.0) for name in AIRCRAFT.controls]
+        if not self.lateness:
+            return np.zeros(len(late) * len(LAGS)), {}
+        if late != self.servos.lateness:
+            self.servos = self.servos.moved(late)
+        rows = []
+        for k in range(10 * self.count, 10 * self.count + 10):
+            if k % 50 == 0:
+                self.commands = (0.05 * self.random.choice([-1.0, 0.0, 1.0], len(late))).tolist()
+            now = 0.01 * k
+            behind = self.lagged.follow(now, self.commands)
+            self.servos.follow(now, self.commands)
+            rows.append([*behind, *(np.array(self.servos.positions) - self.commands)])
+        behind, moved = np.split(np.mean(rows, axis=0), [-len(late)])
+        return behind, {name: moved[i] for i, name in enumerate(AIRCRAFT.controls) if name in self.lateness}
 
 
 def monitored(seed: int, **settings: float) -> tuple[MonitorState, Maker]:

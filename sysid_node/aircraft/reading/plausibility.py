@@ -9,12 +9,11 @@ import math
 import warnings
 from collections.abc import Iterator, Mapping
 
-from scipy.constants import g
-
 from sysid_node.aircraft.document import DocumentEntry
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import ModelWarning
 
+_GRAVITY = 9.80665  # m/s^2
 _LIFT = (0.01, 6.0)  # lift coefficient of level flight at the reference condition
 _CHORDS = (0.5, 80.0)  # span over mean chord: of a lifting body, and beyond that of any glider
 _GYRATION = (0.02, 1.5)  # radius of gyration over the larger of span and chord
@@ -43,7 +42,7 @@ def warn_of_implausible(fields: Mapping[str, DocumentEntry], aircraft: Aircraft)
 
 
 def _weight_and_wing(aircraft: Aircraft) -> Iterator[tuple[str, str]]:
-    weight, geometry, reference = aircraft.mass * g, aircraft.geometry, aircraft.reference
+    weight, geometry, reference = aircraft.mass * _GRAVITY, aircraft.geometry, aircraft.reference
     lift = weight / (0.5 * reference.air_density * reference.airspeed**2 * geometry.S)
     if not _LIFT[0] <= lift <= _LIFT[1]:
         yield (

@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.signal import butter, sosfiltfilt
 
 from sysid_node.flight.record import Array, FlightRecord
 
@@ -62,6 +61,8 @@ def lowpass(time: Array, X: Array, cutoff: float) -> Array:
     rate = 1.0 / float(np.median(np.diff(time)))
     if not 0.0 < cutoff < 0.5 * rate:
         return X
+    from scipy.signal import butter, sosfiltfilt  # noqa: PLC0415  # importing it takes half a second
+
     sections = butter(2, cutoff, fs=rate, output="sos")
     return np.asarray(sosfiltfilt(sections, X, axis=0, padlen=min(len(X) - 1, int(3 * rate / cutoff))))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from scipy import stats
+from scipy.special import stdtrit
 
 NORMAL_95 = 1.959963984540054  # standard errors of the normal distribution's two-sided 95 % interval
 
@@ -64,5 +64,5 @@ class ParameterEstimate:
 
 def confidence_interval(value: float, standard_error: float, freedom: float) -> tuple[float, float]:
     """The 95 % interval, lower and upper end, of Student's t with ``freedom`` degrees of freedom."""
-    half = float(stats.t.ppf(0.975, freedom)) * standard_error
+    half = float(stdtrit(freedom, 0.975)) * standard_error
     return value - half, value + half

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
-
-from sysid_node.faults.recorded_flight import FaultVerdict
 from sysid_node.interruption import on_interrupt
-from sysid_node.online.types import Estimates
+
+if TYPE_CHECKING:
+    from sysid_node.faults.recorded_flight import FaultVerdict
+    from sysid_node.online.types import Estimates
 
 
 @contextmanager
@@ -20,6 +19,9 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float
 
     Nothing is shown where ``quiet`` or where stderr is a file.
     """
+    from rich.console import Console  # noqa: PLC0415  # a tenth of a second that no --help needs
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+
     columns = (TextColumn(title), BarColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
     console = Console(stderr=True)
     with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as progress:
@@ -33,6 +35,9 @@ def show_estimates(final: Estimates, truth: Mapping[str, float], since: Mapping[
 
     ``since``: s from which on it is that, of those that have changed.
     """
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
     table = Table(box=None, header_style="bold", padding=(0, 1, 0, 0))
     for heading, justify in (("derivative", "left"), ("estimate", "right"), ("95 % interval", "left")):
         table.add_column(heading, justify=justify)  # type: ignore[arg-type]
@@ -59,6 +64,8 @@ def _true(name: str, truth: Mapping[str, float], since: Mapping[str, float]) -> 
 
 def show_faults(verdict: FaultVerdict) -> None:
     """Print the faults that the fault monitor would have reported in flight."""
+    from rich.console import Console  # noqa: PLC0415
+
     style = "bold yellow" if verdict.episodes else "dim"
     for sentence in verdict.sentences:
         Console().print(f"faults: {sentence}", style=style, highlight=False, soft_wrap=True)

@@ -20,15 +20,15 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.names import COEFFICIENTS, LATERAL, LONGITUDINAL
 from sysid_node.faults.hypotheses.bayes_factors import Shift
-from sysid_node.faults.model.lagged_controls import LAGS, shares_of
+from sysid_node.faults.model.lagged_controls import LAGS
 from sysid_node.faults.model.terms import RATES, Terms
 from sysid_node.faults.types import AIRSPEED, DAMAGE, LOSS, SHIFTED, SLOWER, STUCK, VANE_OFFSET
 
 Array = NDArray[np.float64]
 
-#: Prior standard deviations: share of a surface's effect, angle of a surface (rad), lateness of a servo (s), share of
+#: Prior standard deviations: share of a surface's effect, angle of a surface (rad), share of a lag of a servo, share of
 #: dynamic pressure, angle of a vane (rad), share of a derivative.
-LOST, MOVED, SLOWED, PRESSURE, TURNED, CHANGED = 0.5, 0.1, 0.1, 0.5, 0.1, 0.5
+LOST, MOVED, SLOWED, PRESSURE, TURNED, CHANGED = 0.5, 0.1, 0.8, 0.5, 0.1, 0.5
 LIMIT = 0.35  # rad, where the aircraft file gives no limit
 _LIFT, _DRAG = COEFFICIENTS.index("CL"), COEFFICIENTS.index("CD")
 
@@ -42,6 +42,7 @@ class Hypothesis:
     shift: Shift
     limit: float = 0.0  # rad, of a surface's travel
     whole: bool = False  # all derivatives of an axis, which can fit any change
+    measure: tuple[float, ...] = (1.0,)  # the size by one of each free direction; damage has none
     one_sided: bool = False  # its size is never negative
 
 
@@ -52,7 +53,9 @@ def hypotheses(aircraft: Aircraft, terms: Terms, reference: Array, commanded: Co
         if terms.of(control.symbol).any():
             found += _of_surface(name, control.symbol, control.limit or LIMIT, terms, reference)
             if name in commanded:
-                found.append(Hypothesis(SLOWER, name, _slower(name, terms, reference), one_sided=True))
+                found.append(
+                    Hypothesis(SLOWER, name, _slower(name, terms, reference.size), measure=LAGS, one_sided=True)
+                )
     found.append(Hypothesis(AIRSPEED, "airspeed", _free([_pressure(terms, reference)], [PRESSURE])))
     for vane in ("alpha", "beta"):
         if terms.of(vane).any():
@@ -88,12 +91,10 @@ def _of_surface(name: str, symbol: str, limit: float, terms: Terms, reference: A
     ]
 
 
-def _slower(name: str, terms: Terms, reference: Array) -> Shift:
-    """The shift by a servo that is one second later, by the chord to one that is ``SLOWED`` later."""
+def _slower(name: str, terms: Terms, count: int) -> Shift:
+    """The shift by a servo that is slower: the shares of its lags change, each by itself, as its order is not known."""
     servo, _ = terms.servos[name]
-    late, free = float(reference[servo] @ LAGS), np.zeros_like(reference)
-    free[servo] = (shares_of(late + SLOWED, 0.0)[0] - shares_of(late, 0.0)[0]) / SLOWED
-    return _free([free], [SLOWED])
+    return _free(list(np.eye(count)[servo]), [SLOWED] * servo.size)
 
 
 def _offsets(regressor: str, terms: Terms, reference: Array) -> Array:

@@ -20,6 +20,7 @@ from sysid_node.faults.hypotheses.bayes_factors import (
     weigh_each,
     weigh_loosely,
 )
+from sysid_node.faults.hypotheses.catalogue import Hypothesis
 from sysid_node.faults.hypotheses.vane_check import stuck_factor
 from sysid_node.faults.model import gust_correlation, residual_whitening
 from sysid_node.faults.model.reference_model import ModelPrior
@@ -183,9 +184,13 @@ def promising(state: MonitorState, over: FlightInterval, usual: Array, squares: 
 def _possible(state: MonitorState, found: Sequence[Weighed]) -> list[Weighed]:
     """The same, where a size with a wrong sign has no support."""
     return [
-        replace(weighed, factor=-math.inf) if hypothesis.one_sided and weighed.size[0] < 0.0 else weighed
+        replace(weighed, factor=-math.inf) if hypothesis.one_sided and _negative(hypothesis, weighed) else weighed
         for hypothesis, weighed in zip(state.hypotheses.each, found, strict=True)
     ]
+
+
+def _negative(hypothesis: Hypothesis, weighed: Weighed) -> bool:
+    return bool(weighed.size.size) and float(np.array(hypothesis.measure) @ weighed.size) < 0.0
 
 
 def excess(state: MonitorState, over: FlightInterval, place: int, weighed: Weighed) -> float:

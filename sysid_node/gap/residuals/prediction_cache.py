@@ -57,4 +57,7 @@ _LOCK = Lock()
 def cache_of(model: object) -> PredictionCache:
     """The cache of a residual model, which is another's even where all of its data are the same."""
     with _LOCK:
-        return _CACHES.setdefault(model, PredictionCache())
+        cache = _CACHES.get(model)
+        if cache is None:
+            cache = _CACHES[model] = PredictionCache()
+        return cache

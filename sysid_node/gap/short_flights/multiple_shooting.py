@@ -9,7 +9,6 @@ and not its error, and the error of a flow angle is that of the simulator's own 
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -27,6 +26,7 @@ from sysid_node.gap.residuals.flight_path_reconstruction import (
     corrected_motion,
 )
 from sysid_node.gap.residuals.residual_model import ResidualModel
+from sysid_node.sim.compiled.programs import kept, result_type
 from sysid_node.sim.flying.rollout import Pilot, StepState, advance, begin
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import OUTPUTS, AircraftNumbers, ParameterLayout, Scalar
@@ -59,6 +59,7 @@ class _Start(NamedTuple):
     probe: Scalar  # (3,) what the lagged probe held then
 
 
+@result_type
 class Readings(NamedTuple):
     """Readings of the simulator and of the flight, N samples at the time of the motion, columns ``layout.OUTPUTS``.
 
@@ -70,7 +71,7 @@ class Readings(NamedTuple):
     air: Scalar  # (N, 3) velocity of the air along body axes since the short flight began, m/s
 
 
-@partial(jax.jit, static_argnums=0)
+@kept(1)
 def fly(layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, course: Course, step: Scalar) -> Readings:
     """The readings with parameters (P,) beside a flight; a pure function of arrays, compiled."""
     chain = Chain.of(layout, model, theta, step, course.altitude[0])
@@ -156,7 +157,7 @@ def course_of(model: ResidualModel, size: int) -> Course:
     The flight must have attitude (``readings.can_be_simulated``).
     """
     given = model.inputs
-    altitude = jnp.asarray([altitude_of(float(density)) for density in given.signals.density])
+    altitude = jnp.asarray([altitude_of(density) for density in np.asarray(given.signals.density).tolist()])
     begins = jnp.arange(altitude.size) % size == 0
     still = jnp.zeros((altitude.size, 3))
     assert given.motion is not None
@@ -164,6 +165,7 @@ def course_of(model: ResidualModel, size: int) -> Course:
     return Course(given.motion, given.signals.commands, given.signals.unfiltered, altitude, still, still, begins)
 
 
+@result_type
 class Beginnings(NamedTuple):
     """What short flights of any simulator are flown with and read by, N samples (arrays)."""
 
@@ -173,7 +175,7 @@ class Beginnings(NamedTuple):
     measured: Array  # (N, 12) readings at the time of the motion, columns ``layout.OUTPUTS``
 
 
-@partial(jax.jit, static_argnums=0)
+@kept(1)
 def _beginnings(
     layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, course: Course, step: Scalar
 ) -> Beginnings:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.signal import lfilter
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.record import Array
@@ -38,6 +37,8 @@ def _behind(time: Array, values: Array, late: float) -> Array:
     """Values (N,) behind a first-order lag (s); where that is negative, as much earlier."""
     if late < 0.0:
         return np.interp(time - late, time, values)
+    from scipy.signal import lfilter  # noqa: PLC0415  # importing it takes half a second
+
     step = float(np.median(np.diff(time)))
     even = np.arange(time[0], time[-1] + 0.5 * step, step)
     signal = np.interp(even, time, values)

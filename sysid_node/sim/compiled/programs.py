@@ -23,8 +23,16 @@ from sysid_node.dynamics.vector import Vector
 from sysid_node.sim.compiled.xla import cache_folder
 
 _Result = TypeVar("_Result")
+_Tuple = TypeVar("_Tuple", bound=type)
 
-export.register_namedtuple_serialization(Vector, serialized_name="sysid.Vector")
+
+def result_type(named_tuple: _Tuple) -> _Tuple:
+    """The class of named tuples itself, which may then be part of the result of a program that is kept."""
+    export.register_namedtuple_serialization(named_tuple, serialized_name=f"sysid.{named_tuple.__name__}")
+    return named_tuple
+
+
+result_type(Vector)
 
 #: The package whose sources shape the programs.
 PACKAGE = Path(__file__).parents[2]
@@ -34,8 +42,9 @@ def kept(fixed: int, package: Path = PACKAGE) -> Callable[[Callable[..., _Result
     """A decorator that keeps a compiled program for each value of the first ``fixed`` arguments.
 
     These arguments must be hashable and have the same text in every process (functions count by their names). The other
-    arguments and the result are trees of arrays; the result's tuples must be known to ``jax.export``. Programs cannot
-    be differentiated further. The digest is of the sources below ``package``.
+    arguments and the result are trees of arrays; a named tuple in the result must be a ``result_type``. Programs cannot
+    be differentiated further. The digest is of the sources of the function's layer below ``package``, and of the layers
+    that it may import.
     """
 
     def decorated(function: Callable[..., _Result]) -> Callable[..., _Result]:
@@ -49,8 +58,9 @@ def kept(fixed: int, package: Path = PACKAGE) -> Callable[[Callable[..., _Result
 
             if find_spec("flatbuffers") is None:
                 return flat(*leaves)
-            key = (function.__qualname__, *map(_text_of, arguments[:fixed]), tree, shapes)
-            found: Any = _program(repr(key), _sources(package), partial(export.export(jax.jit(flat)), *shapes))
+            key = (function.__module__, function.__qualname__, *map(_text_of, arguments[:fixed]), tree, shapes)
+            sources = _sources(package, function.__module__)
+            found: Any = _program(repr(key), sources, partial(export.export(jax.jit(flat)), *shapes))
             result: _Result = found.call(*leaves)
             return result
 
@@ -86,18 +96,20 @@ def _program(key: str, sources: str, trace: Callable[[], export.Exported]) -> ex
     return traced
 
 
-#: Layers whose sources shape the programs: the diagnosis, whose thresholds may be constants in them, and those below.
-_SHAPING = ("aircraft", "dynamics", "flight", "sim", "gap")
+#: Layers whose sources shape the programs, the lowest first. The thresholds of the diagnosis may be constants in them.
+_SHAPING = ("aircraft", "dynamics", "flight", "sim", "excite", "gap")
 
 #: Largest size of all programs that stay on the disk, bytes.
 LARGEST = 200_000_000
 
 
 @cache
-def _sources(package: Path) -> str:
-    """Digest of the sources that shape the programs."""
+def _sources(package: Path, module: str) -> str:
+    """Digest of the sources that shape a program: those of its module's layer and of the layers below."""
+    layer = next((layer for layer in _SHAPING if f".{layer}." in module), _SHAPING[-1])
+    layers = _SHAPING[: _SHAPING.index(layer) + 1]
     digest = hashlib.sha256()
-    for path in sorted(path for room in _SHAPING for path in (package / room).rglob("*.py")):
+    for path in sorted(path for room in layers for path in (package / room).rglob("*.py")):
         digest.update(str(path.relative_to(package)).encode() + path.read_bytes())
     return digest.hexdigest()
 

@@ -7,16 +7,15 @@ loops around rate damping); they are not optimised.
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.dynamics.attitude import euler_angles
+from sysid_node.sim.compiled.programs import kept
 from sysid_node.sim.flying.lengths import cut, padded
 from sysid_node.sim.flying.rollout import RolloutInputs, SimulatedFlight, fly
 from sysid_node.sim.flying.trim import Trim
@@ -111,7 +110,7 @@ def fly_held(
     return cut(flight, samples)
 
 
-@partial(jax.jit, static_argnums=(0, 1))
+@kept(2)
 def _fly_held(
     layout: ParameterLayout,
     history: int,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.sim.flying.rollout import SimulatedFlight
 
@@ -25,6 +26,12 @@ def padded_length(samples: int) -> int:
     return length if samples <= length else -(-samples // _BLOCK) * _BLOCK
 
 
+def on_device(values: NDArray[Any]) -> jax.Array:
+    """An array of JAX. ``jnp.asarray`` would compile a program for each new shape."""
+    array: jax.Array = jax.device_put(values)
+    return array
+
+
 def padded(series: _Series) -> _Series:
     """A tree of series (N, ...) with their last values repeated up to ``padded_length``.
 
@@ -34,8 +41,10 @@ def padded(series: _Series) -> _Series:
 
     def longer(values: jax.Array) -> jax.Array:
         missing = padded_length(len(values)) - len(values)
-        pad = jnp.pad if isinstance(values, jax.core.Tracer) else np.pad
-        return jnp.asarray(pad(values, [(0, missing)] + [(0, 0)] * (values.ndim - 1), mode="edge"))
+        width = [(0, missing)] + [(0, 0)] * (values.ndim - 1)
+        if isinstance(values, jax.core.Tracer):
+            return jnp.pad(values, width, mode="edge")
+        return on_device(np.pad(values, width, mode="edge"))
 
     longest: _Series = jax.tree.map(longer, series)
     return longest
@@ -44,5 +53,5 @@ def padded(series: _Series) -> _Series:
 def cut(flight: SimulatedFlight, samples: int) -> SimulatedFlight:
     """The first samples of a flight that was padded."""
     return SimulatedFlight(
-        *(s[:samples] if isinstance(s, jax.core.Tracer) else jnp.asarray(np.asarray(s)[:samples]) for s in flight)
+        *(s[:samples] if isinstance(s, jax.core.Tracer) else on_device(np.asarray(s)[:samples]) for s in flight)
     )

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 from sysid_node.dynamics.attitude import euler_angles
 from sysid_node.dynamics.lever_arm import specific_force_at
 from sysid_node.dynamics.vector import Vector
+from sysid_node.sim.compiled.programs import result_type
 from sysid_node.sim.effects import stall_separation
 from sysid_node.sim.model.chain import Chain, Drive, SensedMotion, derivative, drive_of
 from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar
@@ -34,6 +35,7 @@ class RolloutInputs(NamedTuple):
     noise: Scalar  # (N, 12): unit white noise, scaled by the effect ``sensor_noise``
 
 
+@result_type
 class SimulatedFlight(NamedTuple):
     """A simulated flight; N samples."""
 

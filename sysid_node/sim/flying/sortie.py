@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -133,6 +132,4 @@ def _inputs(simulator: Simulator, trim: Trim, commands: Array, conditions: Sorti
     dryden = Dryden.at(conditions.height, simulator.aircraft.geometry.b)
     gusts = dryden.realisation(samples, simulator.rate, speed, turbulence)
     gusts[:, 3:] *= conditions.rotary_gusts
-    return simulator.inputs(
-        jnp.asarray(commands), turbulence=gusts, noise=noise.standard_normal((samples, len(OUTPUTS)))
-    )
+    return simulator.inputs(commands, turbulence=gusts, noise=noise.standard_normal((samples, len(OUTPUTS))))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -17,6 +16,7 @@ from sysid_node.dynamics.airflow import velocity_of
 from sysid_node.dynamics.atmosphere import GRAVITY, altitude_of
 from sysid_node.dynamics.attitude import quaternion, to_earth
 from sysid_node.errors import InputError
+from sysid_node.sim.compiled.programs import kept
 from sysid_node.sim.flying.rollout import settled
 from sysid_node.sim.model.chain import Chain, derivative, drive_of
 from sysid_node.sim.model.layout import AircraftNumbers, ParameterLayout, Scalar
@@ -89,8 +89,10 @@ def _solve(
     """All unknowns (angles, command) at the trim, and the residual (7,) there."""
     fixed = (simulator.layout, simulator.model, theta, point)
 
-    def whole(z: Array) -> Scalar:
-        return jnp.asarray(start).at[free].set(z)
+    def whole(z: Array) -> Array:
+        every = start.copy()
+        every[free] = z
+        return every
 
     def residual(z: Array) -> Array:
         return np.asarray(_residual(*fixed, whole(z)))
@@ -109,7 +111,7 @@ def _solve(
         ftol=1e-15,
         gtol=1e-15,
     )
-    return np.asarray(whole(solution.x)), solution.fun
+    return whole(solution.x), solution.fun
 
 
 def _search_space(simulator: Simulator, climb_angle: float) -> tuple[Array, Array, Array, Index]:
@@ -127,8 +129,7 @@ def _search_space(simulator: Simulator, climb_angle: float) -> tuple[Array, Arra
     return start, lower, upper, np.array([i for i in range(len(start)) if i not in fixed])
 
 
-@partial(jax.jit, static_argnums=0)
-def _residual(layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, point: TrimPoint, z: Scalar) -> Scalar:
+def _imbalance(layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, point: TrimPoint, z: Scalar) -> Scalar:
     """Residual (7,): accelerations (6,) and the error of the sine of the climb angle."""
     chain = Chain.of(layout, model, theta, jnp.asarray(0.01), point.altitude)
     command = z[len(_ANGLES) :]
@@ -142,7 +143,10 @@ def _residual(layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, po
     return jnp.concatenate([rates[3:6], rates[10:13], (sink / point.airspeed + jnp.sin(z[4]))[None]])
 
 
-@partial(jax.jit, static_argnums=0)
+_residual = kept(1)(_imbalance)
+
+
+@kept(1)
 def _slope(
     layout: ParameterLayout,
     model: AircraftNumbers,
@@ -156,7 +160,7 @@ def _slope(
     A program for all directions at once takes four times as long to compile, and a trim calls it a few times only.
     """
     slope: Scalar
-    _, slope = jax.jvp(lambda y: _residual(layout, model, theta, point, y), (z,), (direction,))
+    _, slope = jax.jvp(lambda y: _imbalance(layout, model, theta, point, y), (z,), (direction,))
     return slope
 
 

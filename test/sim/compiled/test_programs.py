@@ -96,3 +96,38 @@ def test_a_program_that_is_used_becomes_the_newest(folder: Path) -> None:
     os.utime(path, (1000.0, 1000.0))
     traced([])("one", {"x": X})
     assert path.stat().st_mtime > 1000.0
+
+
+def squares(times: list[str], module: str, package: Path) -> object:
+    """A program of a module, which notes when it is traced."""
+
+    def square(name: str, x: Scalar) -> Scalar:
+        times.append(module)
+        return x**2
+
+    square.__module__ = module
+    return kept(1, package)(square)
+
+
+def test_a_program_is_another_only_where_its_layer_or_one_below_has_changed(folder: Path, tmp_path: Path) -> None:
+    times: list[str] = []
+    for sources in (
+        {"sim": "first", "gap": "first"},
+        {"sim": "first", "gap": "other"},
+        {"sim": "other", "gap": "other"},
+    ):
+        package = tmp_path / "_".join(sources.values())
+        for layer, text in sources.items():
+            (package / layer).mkdir(parents=True)
+            (package / layer / "chain.py").write_text(f"# {text}")
+        times.append(package.name)
+        squares(times, "sysid_node.sim.any", package)("one", X)
+    traced_now = "sysid_node.sim.any"
+    assert times == ["first_first", traced_now, "first_other", "other_other", traced_now]
+
+
+def test_functions_of_one_name_in_two_modules_are_two_programs(folder: Path, tmp_path: Path) -> None:
+    times: list[str] = []
+    for module in ("sysid_node.sim.one", "sysid_node.sim.other"):
+        squares(times, module, tmp_path)("one", X)
+    assert times == ["sysid_node.sim.one", "sysid_node.sim.other"]
