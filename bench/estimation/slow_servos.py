@@ -1,6 +1,6 @@
 """Whether the fault monitor names a servo that becomes slower in flight, where only commands are recorded.
 
-    python -m bench.estimation.slow_servos [--flights 3] [--page docs/results/faults.md]
+    python -m bench.estimation.slow_servos [--flights 3] [--first 1] [--page docs/results/faults.md]
 
 The plant is written apart from the package (`bench/withheld/plants`). An autopilot holds `cdrw` while 3-2-1-1s move one
 surface after the other; the servos are of second order at 8 Hz. At 40 s of 80 s a further lag of first order comes into
@@ -90,12 +90,15 @@ def row(case: Case, air: str, flights: Sequence[list[Episode]]) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=3, help="of each case, in each air")
+    parser.add_argument("--first", type=int, default=1, help="number of the first flight")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     rows = []
     for case in CASES:
         for air in AIRS:
-            rows.append(row(case, air, [watched(case, air, seed) for seed in range(1, args.flights + 1)]))
+            rows.append(
+                row(case, air, [watched(case, air, seed) for seed in range(args.first, args.first + args.flights)])
+            )
             print(*rows[-1], sep=" | ", flush=True)
     heads = ("what happens; turbulence", "servo named", "after s: median", "slower by s: median")
     heads += ("true one in the interval", "another servo named", "other faults named")

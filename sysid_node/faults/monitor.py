@@ -5,8 +5,8 @@
 
 Ten times a second the hypotheses are tested on intervals of the last 0.5 to 8 s against the reference model. The first
 Bayes factor above the threshold raises an alarm. From then on the reference model is frozen, the onset is estimated,
-and all blocks since the onset decide which fault it is and how large. The alarm ends when the last seconds contradict
-it.
+and all blocks since the onset decide which fault it is and how large. The alarm ends when they or the last seconds
+contradict it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.faults.hypotheses.bayes_factors import Shifts
+from sysid_node.faults.hypotheses.bayes_factors import Shifts, Weighed
 from sysid_node.faults.hypotheses.catalogue import hypotheses
 from sysid_node.faults.hypotheses.weighing import (
     VANES,
@@ -60,6 +60,7 @@ USUAL = 60.0  # s, time constant of a statistic's mean
 DATED = 5.0  # s after an alarm in which its onset is estimated
 MUCH, LITTLE = 0.2, 1.5  # share of the largest log Bayes factor; multiple of the least residual energy
 CHANCE = 10.0  # residual energy due to chance, in units of a block's noise energy
+CONTRADICTED = 3.0  # log likelihood ratio
 OUTLIER = 10.0  # statistics enter their mean with at most this value
 
 
@@ -269,28 +270,44 @@ def _alarm(state: MonitorState, over: FlightInterval, usual: Array) -> None:
 
 
 def _follow(state: MonitorState, alarm: Alarm) -> None:
-    """Compare the hypotheses on all blocks since the onset; end the alarm where the last seconds contradict it.
+    """Compare the hypotheses on all blocks since the onset; end the alarm where they or the last seconds contradict it.
 
     Damage explains the first blocks as well as a failed surface does, so that it is reported only after more blocks.
+    Once the onset is no longer among the blocks, the fault keeps its name, and stands while nothing moves that would
+    show it.
     """
-    if len(state.history.pieces) < LEAST:
+    pieces = state.history.pieces
+    if len(pieces) < LEAST:
         return  # after a gap
-    now = state.history.pieces[-1].block.time
+    now = pieces[-1].block.time
     if now - alarm.found <= DATED:
         alarm.since, alarm.prior = _onset(state, alarm)
-    over = changed_since(state, min(max(_since(state, alarm.since), LEAST), len(state.history.pieces)), alarm.prior)
+    over = changed_since(state, min(max(_since(state, alarm.since), LEAST), len(pieces)), alarm.prior)
     found = explained(state, over, alarm.usual)
     factors = np.array([*(w.factor for w in found), *stuck_vanes(state, over.pieces)[0]])
-    place = int(np.argmax(factors))
-    times = Detection(min(alarm.since, alarm.found), alarm.found, _sure(state, factors, place))
-    if place >= len(found):
-        state.fault = Fault(VANE_STUCK, list(VANES)[place - len(found)], *(math.nan,) * 3, "", *times)
-    elif state.hypotheses.each[place].kind != DAMAGE or now - alarm.found > (EVERY - 0.5) * PERIOD:
-        state.fault = fault_of(state.hypotheses.each[place], found[place], state.terms, times)
-    if now - alarm.found > LAG * PERIOD and _over(state, place, alarm):
+    remembered = pieces[0].block.time <= alarm.since + PERIOD
+    if remembered:
+        alarm.place = int(np.argmax(factors))
+    if remembered or factors[alarm.place] > state.settings.threshold:
+        _name(state, alarm, found, factors)
+    if now - alarm.found > LAG * PERIOD and ((remembered and factors.max() < 0.0) or _contradicted(state, alarm)):
         state.alarm = state.fault = None
         state.history.pieces.clear()
         state.usual.clear()
+
+
+def _name(state: MonitorState, alarm: Alarm, found: Sequence[Weighed], factors: Array) -> None:
+    """Report the fault at the alarm's place among the hypotheses, which are ``found``, and the stuck vanes."""
+    place = alarm.place
+    times = Detection(min(alarm.since, alarm.found), alarm.found, _sure(state, factors, place))
+    if place >= len(found):
+        alarm.shift = None
+        state.fault = Fault(VANE_STUCK, list(VANES)[place - len(found)], *(math.nan,) * 3, "", *times)
+        return
+    hypothesis, weighed = state.hypotheses.each[place], found[place]
+    alarm.shift = hypothesis.shift.fixed + hypothesis.shift.free @ weighed.size
+    if hypothesis.kind != DAMAGE or state.history.pieces[-1].block.time - alarm.found > (EVERY - 0.5) * PERIOD:
+        state.fault = fault_of(hypothesis, weighed, state.terms, times)
 
 
 def _sure(state: MonitorState, factors: Array, place: int) -> float:
@@ -337,8 +354,9 @@ def _left(state: MonitorState, over: FlightInterval, usual: Array) -> float:
     return max(share - 1.0, 0.0) * len(over.pieces) + CHANCE
 
 
-def _over(state: MonitorState, place: int, alarm: Alarm) -> bool:
-    """Whether the last seconds contradict the fault."""
+def _contradicted(state: MonitorState, alarm: Alarm) -> bool:
+    """Whether the last seconds are much likelier without the fault, as large as it was found, than with it."""
     over = last_interval(state, min(LAG, len(state.history.pieces)), alarm.prior)
-    factors = [*(w.factor for w in weights(state, over, alarm.usual)), *stuck_vanes(state, over.pieces)[0]]
-    return bool(factors[place] < 0.0)
+    if alarm.shift is None:
+        return bool(stuck_vanes(state, over.pieces)[0, alarm.place - len(state.hypotheses.each)] < 0.0)
+    return bool(alarm.shift @ over.v - 0.5 * alarm.shift @ over.J @ alarm.shift < -CONTRADICTED)

@@ -47,6 +47,8 @@ class Alarm:
     since: float
     usual: Array  # (H,) mean of the statistics before it
     prior: ModelPrior  # of the model without a fault
+    place: int = 0  # of the fault that is named, among the hypotheses and after them the stuck vanes
+    shift: Array | None = None  # (D,) of the terms by the fault that is named; None for a stuck vane
 
 
 @dataclass(frozen=True)

@@ -49,6 +49,7 @@ class Maker:
         self.lagged = LaggedControls(len(AIRCRAFT.controls))
         self.servos = ServoStates([0.0] * len(AIRCRAFT.controls))
         self.count = 0
+        self.moving = 1.0
         self.noise = np.zeros(6)
         self.motion = dict.fromkeys(SIZES, 0.0)
         self.values = {name: derivative.value for name, derivative in AIRCRAFT.derivatives.items()}
@@ -59,7 +60,7 @@ class Maker:
         fresh = self.random.standard_normal(6) * NOISE * rough * np.sqrt(1.0 - MEMORY**2)
         self.noise = MEMORY * self.noise + fresh
         for name, size in SIZES.items():
-            self.motion[name] = 0.85 * self.motion[name] + size * 0.53 * self.random.standard_normal()
+            self.motion[name] = 0.85 * self.motion[name] + self.moving * size * 0.53 * self.random.standard_normal()
         measured = {name: self.motion[name] + TRIM.get(name, 0.0) for name in SIZES} | {"0": 1.0}
         values, signals = truth(self.values, dict(measured))
         outputs = self.noise.copy()

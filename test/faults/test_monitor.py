@@ -169,6 +169,19 @@ def test_the_alarm_ends_with_the_fault() -> None:
     assert fly(state, maker, 30.0, lost("de", 0.6)) is not None
 
 
+def test_a_fault_stands_while_nothing_moves_that_would_show_it() -> None:
+    """Level flight for half a minute, longer than blocks are remembered; then the elevator has its effect again."""
+    state, maker = flown(seed=7)
+    found = fly(state, maker, 8.0, lost("de", 0.6))
+    maker.moving = 0.0
+    later = fly(state, maker, 30.0, lost("de", 0.6))
+    assert found is not None and later is not None
+    assert (later.kind, later.part, later.found) == (LOSS, "elevator", found.found)
+    assert later.size == pytest.approx(found.size, abs=0.05)
+    maker.moving = 1.0
+    assert fly(state, maker, 12.0) is None
+
+
 def test_a_gap_is_bridged_without_an_alarm() -> None:
     state, maker = flown(seed=8)
     maker.count += 50
