@@ -15,6 +15,8 @@ from dataclasses import Field, dataclass, field, fields
 from math import log
 from typing import Any, NamedTuple
 
+from sysid_node.flight.live.mean_lift import LARGEST_RATIO, STALL_ANGLE
+
 _CHOSEN = "chosen"
 
 
@@ -29,10 +31,12 @@ class Admission:
 
     least_travel: float = _threshold(0.004, "rad", "travel below which a control surface counts as not moved")
     lift_ratio: float = _threshold(
-        2.5, "1", "ratio of measured to expected mean lift, or its inverse, from which a flight is another aircraft's"
+        LARGEST_RATIO,
+        "1",
+        "ratio of measured to expected mean lift, or its inverse, from which a flight is another aircraft's",
     )
     vane_error: float = _threshold(0.1, "rad", "error of the vane that may account for a wrong mean lift")
-    stall_angle: float = _threshold(0.15, "rad", "mean angle of attack from which a loss of lift may be a stall")
+    stall_angle: float = _threshold(STALL_ANGLE, "rad", "mean angle of attack from which a loss of lift may be a stall")
     excitation: float = _threshold(
         6.0, "1", "power over the power of the sensors' noise below which a flight supports no verdict"
     )
