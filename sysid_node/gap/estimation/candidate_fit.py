@@ -39,7 +39,7 @@ class FlightFit:
     @property
     def weights(self) -> Array:
         """Weights (2 L, 12) of the residual's real and imaginary parts."""
-        return weights(self.model.windows, self.power)
+        return weights(self.power)
 
     @property
     def residual(self) -> Complex:

@@ -205,7 +205,7 @@ def held_out_evidence(fit: CandidateFit, held_out: Sequence[HeldOutFlight]) -> E
         model, kept = flight.model, _kept_nuisances(fit, flight)
         point = transferred_parameters(fit, model)
         power = np.where(model.axes, np.maximum(_mean_power(fit, model), model.noise), 1.0)
-        weight = weights(model.windows, power)
+        weight = weights(power)
         order = [*fit.indices, *_shared_first(kept)]
         rows = real_rows(model.residual(point), weight)
         slopes = real_rows(model.slopes(point, order), weight)
@@ -329,7 +329,7 @@ def _predictive(group: _Group, power: Array, step: Array, information: Array) ->
     spread = windows * float(np.sum(line_shares(group.model) * np.log(power) * group.model.axes))
     squares = float(scaled @ scaled) - float(excess_squares(group.model, power, group.point, windows).sum())
     score = -0.5 * (spread + squares) + 0.5 * float(right @ solve(gained, right)) - 0.5 * (after - before)
-    return score, amplitudes(change, weights(group.model.windows, group.power))
+    return score, amplitudes(change, weights(group.power))
 
 
 def probabilities(scores: Sequence[Array], seed: int = 0) -> Array:

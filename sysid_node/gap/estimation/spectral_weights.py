@@ -13,10 +13,10 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
-from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex, Windows
+from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex
 
 
-def weights(windows: Windows, power: Array) -> Array:
+def weights(power: Array) -> Array:
     """Weights (2 L, 12) of the real parts, then of the imaginary parts, for noise of a power (L, 12).
 
     The line at zero frequency has no imaginary part.

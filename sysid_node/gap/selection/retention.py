@@ -63,17 +63,6 @@ class SuccessorScores(Protocol):
         """Its calibrated probability in the cause's place."""
 
 
-@dataclass(frozen=True)
-class SuccessorTable:
-    """The scores of one possible successor as plain values."""
-
-    label: str
-    share: float
-    score: float
-    comparison: ComparisonScores
-    probability: float
-
-
 def next_challenge(
     causes: Sequence[CauseTable], challenged: frozenset[str] = frozenset(), thresholds: Thresholds = THRESHOLDS
 ) -> Challenge | None:

@@ -1,17 +1,22 @@
 """Which causes are kept, from tables made by hand; truth: each rule, tie and boundary, and sums of probabilities."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sysid_node.gap.selection.acceptance import AddedSize, ChannelScores, ComparisonTable, RemainingPower
+from sysid_node.gap.selection.acceptance import (
+    AddedSize,
+    ChannelScores,
+    ComparisonScores,
+    ComparisonTable,
+    RemainingPower,
+)
 from sysid_node.gap.selection.retention import (
     CauseTable,
     Challenge,
-    SuccessorTable,
     combined_shares,
     kept_causes,
     next_challenge,
@@ -85,8 +90,19 @@ def test_an_improbable_cause_is_challenged_however_often() -> None:
     assert next_challenge([improbable], frozenset({"actuator_lag"})) == Challenge(0, improbable=True)
 
 
-def candidate(label: str, share: float, score: float, probability: float = 0.9) -> SuccessorTable:
-    return SuccessorTable(label, share, score, ACCEPTED, probability)
+@dataclass(frozen=True)
+class Successor:
+    """The scores of one possible successor as plain values."""
+
+    label: str
+    share: float
+    score: float
+    comparison: ComparisonScores
+    probability: float
+
+
+def candidate(label: str, share: float, score: float, probability: float = 0.9) -> Successor:
+    return Successor(label, share, score, ACCEPTED, probability)
 
 
 def test_the_successor_has_the_largest_share_then_predicts_best() -> None:
