@@ -71,7 +71,7 @@ def excess_squares(model: ResidualModel, power: Array, theta: Array, windows: in
     return np.asarray(windows * np.sum(line_shares(model) * model.excess_noise(theta) / power * model.axes, axis=0))
 
 
-def noise_pull(model: ResidualModel, power: Array, theta: Array, indices: Sequence[int], windows: int) -> Array:
+def noise_gradient(model: ResidualModel, power: Array, theta: Array, indices: Sequence[int], windows: int) -> Array:
     """Half the slope (K,) of the sum of ``excess_squares`` with respect to these entries of the parameters (P,).
 
     It is the gradient by which least squares of weighted rows is corrected for the noise of the regressors.

@@ -85,7 +85,7 @@ def test_a_supported_cause_whose_equation_looks_wrong_waits_until_unsupported_on
 
 
 def test_an_improbable_cause_is_challenged_however_often() -> None:
-    """It cannot come back: it is listed as doubted, and barred."""
+    """It cannot come back: it is listed as rejected, and barred."""
     improbable = replace(LAG, probability=0.1)
     assert next_challenge([improbable], frozenset({"actuator_lag"})) == Challenge(0, improbable=True)
 
