@@ -80,7 +80,7 @@ def correlations(state: EstimatorState) -> tuple[float, float, float]:
     sensed = state.changes.monitor.references[-1].sensed
     gusts = gust_correlation.share_of_gusts(latest.uncertainty.density, sensed)
     answered = float(gust_correlation.of_solution(equations, latest.solution, gram, gusts)[c])
-    left = least_squares.misfits(equations, _truth(state))[:, c]
+    left = least_squares.residual_combinations(equations, _truth(state))[:, c]
     own = equations.structure.unknowns(c)
     Z = equations.instruments[own]
     score = gram[Z] @ left

@@ -47,11 +47,11 @@ def causes(text: str) -> Iterator[tuple[str, CauseEvidence, bool]]:
     """Case, grounds, and whether it was there, of every cause of a ledger."""
     name, _, seeds = text.partition(":")
     first, last = (int(part) for part in seeds.split("-")) if seeds else (0, 10**9)
-    for seed, (effect, nats, misfit, there) in ledger.causes(Path(name)):
+    for seed, (effect, nats, misspecification, there) in ledger.causes(Path(name)):
         if first <= seed <= last:
             yield (
                 f"{name}/{seed}",
-                CauseEvidence(nats, misfit, effect in THRESHOLDS.calibration.flexible_effects),
+                CauseEvidence(nats, misspecification, effect in THRESHOLDS.calibration.flexible_effects),
                 there,
             )
 

@@ -26,7 +26,7 @@ from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.replacement import AlternativeTable, PositionTable, next_step
 from sysid_node.gap.selection.retention import CauseTable, next_challenge
 from sysid_node.gap.thresholds import Thresholds
-from sysid_node.gap.verdict.decision import DoubtedScores, VerdictScores, decide
+from sysid_node.gap.verdict.decision import RejectedCauseScores, VerdictScores, decide
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class CandidateScores:
 
 @dataclass(frozen=True)
 class WeighedCause:
-    """A cause that was kept, or an effect that is doubted."""
+    """A cause that was kept, or an effect that is rejected."""
 
     label: str
     kept: bool
@@ -64,8 +64,8 @@ class RecordedDiagnosis:
     def verdict(self, thresholds: Thresholds) -> str:
         """The verdict of the same causes by other thresholds."""
         known = {cause.label: cause.evidence for cause in self.causes if not cause.kept}
-        doubted = tuple(_doubted(each, known[each.label], thresholds) for each in self.scores.doubted)
-        return decide(replace(self.scores, doubted=doubted), thresholds).verdict
+        rejected = tuple(_rejected(each, known[each.label], thresholds) for each in self.scores.rejected)
+        return decide(replace(self.scores, rejected=rejected), thresholds).verdict
 
     def selection(self, thresholds: Thresholds) -> tuple[Any, ...]:
         """What the search for causes decides by these scores: where it changes, other fits would be asked for."""
@@ -95,7 +95,7 @@ class RecordedDiagnosis:
         )  # fmt: skip
 
 
-def _doubted(scores: DoubtedScores, evidence: CauseEvidence, thresholds: Thresholds) -> DoubtedScores:
+def _rejected(scores: RejectedCauseScores, evidence: CauseEvidence, thresholds: Thresholds) -> RejectedCauseScores:
     return replace(scores, supported_but_misspecified=is_supported_but_misspecified(evidence, thresholds))
 
 
@@ -103,7 +103,7 @@ def recorded(name: str, found: Diagnosis) -> RecordedDiagnosis:
     """The scores of a diagnosis."""
     attribution = found.attribution
     base, chosen = attribution.base, attribution.chosen
-    weighed = [(cause, True) for cause in attribution.causes] + [(cause, False) for cause in attribution.doubted]
+    weighed = [(cause, True) for cause in attribution.causes] + [(cause, False) for cause in attribution.rejected]
     return RecordedDiagnosis(
         name=name,
         scores=found.scores,

@@ -34,7 +34,7 @@ DECIDING = {
     "instruments": ("chance",),
     "acceptance": ("probability", "share_of_remainder", "share_of_gap", "noticeable_error", "large_error"),
     "search": ("lead",),
-    "calibration": ("constant", "per_log_nat", "flexible", "misfit", "probability"),
+    "calibration": ("constant", "per_log_nat", "flexible", "misspecification", "probability"),
     "validation": ("chance",),
     "verdict": ("told_apart", "structure", "explained", "closed", "error"),
 }
@@ -111,8 +111,8 @@ def changed(known: Sequence[RecordedDiagnosis], thresholds: Thresholds) -> tuple
 
 def truths(path: Path) -> Iterator[tuple[CauseEvidence, bool]]:
     """The evidence of every cause of a ledger, and whether it was there."""
-    for _, (effect, nats, misfit, there) in ledger.causes(path):
-        yield CauseEvidence(nats, misfit, effect in THRESHOLDS.calibration.flexible_effects), there
+    for _, (effect, nats, misspecification, there) in ledger.causes(path):
+        yield CauseEvidence(nats, misspecification, effect in THRESHOLDS.calibration.flexible_effects), there
 
 
 def named_table(causes: Sequence[tuple[CauseEvidence, bool]]) -> list[str]:

@@ -31,11 +31,11 @@ def linear_derivatives(aircraft: Aircraft) -> dict[str, float]:
     return _sum(values, table_derivatives(aircraft)) if _tables(aircraft) else values
 
 
-def table_derivatives(aircraft: Aircraft, pressure: float = 1.0) -> dict[str, float]:
-    """What the tables add to the derivatives in level flight at ``pressure`` times the reference dynamic pressure."""
+def table_derivatives(aircraft: Aircraft) -> dict[str, float]:
+    """What the tables add to the derivatives in level flight at the reference dynamic pressure."""
     tables = _tables(aircraft)
     over = {name for table in tables for name in table.over} - {"V", "Mach"}
-    return _tangent(aircraft, *trimmed(aircraft, pressure), pressure, sorted(over)) if tables else {}
+    return _tangent(aircraft, *trimmed(aircraft), 1.0, sorted(over)) if tables else {}
 
 
 def trimmed(aircraft: Aircraft, pressure: float = 1.0) -> tuple[float, float]:

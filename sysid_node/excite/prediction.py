@@ -143,16 +143,15 @@ def outputs_of(
     initial: jax.Array,
     commands: jax.Array,
     step: float,
-    file: jax.Array | None = None,
+    file: jax.Array,
 ) -> jax.Array:
     """Outputs (N, 12) with the unknowns, derivatives' errors then initial states', added to their nominal values.
 
-    ``file`` (P,) are the effects of the aircraft file; None: it states none.
+    ``file`` (P,) are the effects of the aircraft file.
     """
-    nominal = parameters.neutral(layout) if file is None else file
     names = parameters.names(layout)
     index = jnp.array([names.index(f"derivative_error.{name}") for name in layout.derivatives])
-    theta = jnp.asarray(nominal).at[index].add(unknowns[: index.size])
+    theta = jnp.asarray(file).at[index].add(unknowns[: index.size])
     start = jnp.asarray(initial).at[jnp.array(_INITIAL)].add(unknowns[index.size :])
     calm = jnp.zeros((commands.shape[0], 6))
     inputs = RolloutInputs(commands, calm, calm, jnp.zeros((commands.shape[0], len(OUTPUTS))))

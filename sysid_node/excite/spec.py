@@ -38,15 +38,13 @@ def parse_manoeuvre(
     aircraft: Aircraft,
     rate: float = 100.0,
     duration: float | None = None,
-    airspeed: float | None = None,
 ) -> Manoeuvre:
     """The manoeuvre that a spec, or several flown together, describes for this aircraft.
 
     Sampled at ``rate`` (Hz) for ``duration`` (s; until 3 s after the last segment where it is None). Raises InputError
     (one line) for a spec that is wrong, a control that the aircraft does not have, or a deflection beyond its limit.
-    ``airspeed`` is as in ``parse_segments``.
     """
-    return draw_manoeuvre(parse_segments(spec, aircraft, airspeed), aircraft, rate, duration)
+    return draw_manoeuvre(parse_segments(spec, aircraft), aircraft, rate, duration)
 
 
 def parse_segments(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -68,8 +68,8 @@ class Plan:
         """What is wrong with a flight, one line: with its entry, or with its log where ``flights`` came to it."""
         return entry.fault or self._log_faults.get(entry.flight, "")
 
-    def flights(self, progress: Callable[[], None] = lambda: None) -> Iterator[PlannedFlight]:
-        """Every flight, one at a time; logs are hashed as they come. ``progress`` is called after each.
+    def flights(self) -> Iterator[PlannedFlight]:
+        """Every flight, one at a time; logs are hashed as they come.
 
         A log that an earlier flight of the same type has, too, under whatever name, is a fault: it would count twice.
         """
@@ -77,7 +77,6 @@ class Plan:
         first: dict[tuple[str, str], str] = {}  # flight by type and log
         for entry in self.catalogue.flights:
             yield self._planned(entry, finished, first)
-            progress()
 
     def _planned(
         self, entry: CatalogueFlight, finished: dict[str, str], first: dict[tuple[str, str], str]

@@ -42,7 +42,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         "air_motion": found.air_motion if found.models[0].axes[len(COEFFICIENTS) :].any() else None,
         "where": found.where,
         "causes": [_cause(found, cause) for cause in attribution.causes],
-        "doubted": [_doubted(cause) for cause in attribution.doubted],
+        "doubted": [_rejected(cause) for cause in attribution.rejected],
         "candidates": [
             {"effect": label, "probability": probability, "share": share} for label, probability, share in ranked(found)
         ],
@@ -82,7 +82,7 @@ def ranked(found: Diagnosis) -> list[tuple[str, float | None, float]]:
     """
     attribution = found.attribution
     effects = {each.added.label: each.added.effect for each in attribution.first_stage if each.added}
-    weighed = (*attribution.doubted, *attribution.causes)
+    weighed = (*attribution.rejected, *attribution.causes)
     as_alternative = {
         effect: share * cause.probability_of_any for cause in weighed for effect, share in cause.alternatives
     }
@@ -127,8 +127,8 @@ def _known(found: Diagnosis, cause: Cause) -> dict[str, Any]:
     return {"believed": values} if values else {}
 
 
-def _doubted(cause: Cause) -> dict[str, Any]:
-    """A doubted effect, with its size in the explanation that it was part of."""
+def _rejected(cause: Cause) -> dict[str, Any]:
+    """A rejected effect (``doubted``), with its size in the explanation that it was part of."""
     return {
         "effect": cause.candidate.effect,
         "label": cause.candidate.label,
@@ -146,7 +146,7 @@ def _grounds(cause: Cause) -> dict[str, Any]:
         "share": cause.share,
         "log_bayes_factor": evidence.log_bayes_factor,
         "tolerances": evidence.by_tolerances,
-        "misspecification": evidence.misfit,
+        "misspecification": evidence.misspecification,
         "flexible": evidence.flexible,
     }
 

@@ -15,6 +15,8 @@ from dataclasses import Field, dataclass, field, fields
 from math import log
 from typing import Any, NamedTuple
 
+from sysid_node.flight.live.mean_lift import LARGEST_RATIO, STALL_ANGLE
+
 _CHOSEN = "chosen"
 
 
@@ -29,10 +31,12 @@ class Admission:
 
     least_travel: float = _threshold(0.004, "rad", "travel below which a control surface counts as not moved")
     lift_ratio: float = _threshold(
-        2.5, "1", "ratio of measured to expected mean lift, or its inverse, from which a flight is another aircraft's"
+        LARGEST_RATIO,
+        "1",
+        "ratio of measured to expected mean lift, or its inverse, from which a flight is another aircraft's",
     )
     vane_error: float = _threshold(0.1, "rad", "error of the vane that may account for a wrong mean lift")
-    stall_angle: float = _threshold(0.15, "rad", "mean angle of attack from which a loss of lift may be a stall")
+    stall_angle: float = _threshold(STALL_ANGLE, "rad", "mean angle of attack from which a loss of lift may be a stall")
     excitation: float = _threshold(
         6.0, "1", "power over the power of the sensors' noise below which a flight supports no verdict"
     )
@@ -152,7 +156,7 @@ class Acceptance:
     joint: float = _threshold(
         4.5,
         "1 sigma",
-        "deviation of all derivatives together from the file up to which their tolerances excuse it",
+        "deviation of all derivatives together from the file up to which it is plausible by their tolerances",
     )
 
     bias: float = _threshold(
@@ -216,16 +220,20 @@ class Calibration:
         "",
         "effects that act as other values of the file's derivatives: their many parameters fit much that is not theirs",
     )
-    misfit: float = _threshold(
+    misspecification: float = _threshold(
         0.3,
         "1",
         "amplitude of what is left and depends on the effect, over what the effect does, from which it is misspecified",
         "chosen by eye between right and wrong causes (docs/results/gap_calibration.md)",
     )
-    deviations: float = _threshold(4.5, "1 sigma", "deviation from chance from which what is left counts as misfit")
-    counted: float = _threshold(0.1, "1", "share of a cause's power from which its misfit on a channel counts")
+    deviations: float = _threshold(
+        4.5, "1 sigma", "deviation from chance from which what is left counts as misspecification"
+    )
+    counted: float = _threshold(
+        0.1, "1", "share of a cause's power from which its misspecification on a channel counts"
+    )
     least_power: float = _threshold(
-        20.0, "1", "power of a cause on a channel, over the noise, below which its misfit there is not tested"
+        20.0, "1", "power of a cause on a channel, over the noise, below which its misspecification there is not tested"
     )
     probability: float = _threshold(0.5, "1", "probability below which a cause is not named: less likely than not")
 
@@ -259,8 +267,8 @@ class Validation:
         0.5, "1", "ratio of the product of two measures' errors to the file's below which one may be worse than a tie"
     )
     tie: float = _threshold(1.05, "1", "ratio of the error with causes to the file's up to which it is a tie")
-    unexcused: float = _threshold(
-        1.1, "1", "largest ratio of the error with a cause to that of derivatives that no tolerances together excuse"
+    implausible_derivatives: float = _threshold(
+        1.1, "1", "largest ratio of the error with a cause to that of derivatives that are implausible together"
     )
     instruments: float = _threshold(
         0.5, "1", "share of the air's apparent power that is left from which errors of the instruments account for it"

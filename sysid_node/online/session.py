@@ -49,7 +49,7 @@ class Session:
     def reset(self) -> None:
         """Forget all messages and estimates."""
         self.state = estimator.init(self.aircraft, self.settings)
-        self.intake = streaming.init(self.aircraft, self.settings.max_gap, self.settings.actuators)
+        self.alignment = streaming.init(self.aircraft, self.settings.max_gap, self.settings.actuators)
         self.schedule = schedule.Schedule(self.publish_rate)
         self.lift = RecentMeanLift(self.aircraft)
         self.samples = 0
@@ -71,7 +71,7 @@ class Session:
     @property
     def rejected(self) -> dict[str, int]:
         """Messages left out: ``"<topic>: <reason>"`` -> count."""
-        return counts_by_reason(self.intake.rejected)
+        return counts_by_reason(self.alignment.rejected)
 
     @property
     def force_fault(self) -> str:
@@ -99,7 +99,7 @@ class Session:
         assert last is not None
         current = current_solution(self.state)
         estimates = estimate_of(self.state, current, last + silence)
-        return Due(streaming.stamp_of(self.intake, last), estimates, current)
+        return Due(streaming.stamp_of(self.alignment, last), estimates, current)
 
     def renewed_covariance(self) -> EstimateCovariance | None:
         """The covariance of the estimates; None where no renewal has changed its correlations since it was asked for.
@@ -130,25 +130,25 @@ class Session:
 
     def refuse(self, topic: str, reason: str) -> None:
         """Count a message that cannot be read."""
-        streaming.refuse(self.intake, topic, reason)
+        streaming.refuse(self.alignment, topic, reason)
 
     def imu(self, stamp_ns: int, values: tuple[float, ...]) -> list[Due]:
         """Take an IMU message: specific force (m/s^2) and rates (rad/s), FRD. Returns what falls due."""
-        return self._take(streaming.on_imu(self.intake, stamp_ns, values))
+        return self._take(streaming.on_imu(self.alignment, stamp_ns, values))
 
     def air_data(self, stamp_ns: int, values: tuple[float, ...]) -> list[Due]:
         """Take an air data message: true airspeed (m/s), flow angles (rad), air density (kg/m^3)."""
-        return self._take(streaming.on_air_data(self.intake, stamp_ns, values))
+        return self._take(streaming.on_air_data(self.alignment, stamp_ns, values))
 
     def actuators(self, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> list[Due]:
         """Take joint positions: rad, throttle 0..1 or N."""
-        return self._take(streaming.on_actuators(self.intake, stamp_ns, names, positions))
+        return self._take(streaming.on_actuators(self.alignment, stamp_ns, names, positions))
 
     def _take(self, samples: Iterable[streaming.AlignedSample]) -> list[Due]:
         results = []
         for moment, sample, wait in samples:
             start = time.perf_counter()
-            if moment >= self.intake.commands_from and not self.state.model.sample.commanded:
+            if moment >= self.alignment.commands_from and not self.state.model.sample.commanded:
                 self.state = estimator.begin_with_commands(self.state, moment)
             estimator.update(self.state, moment, sample)
             self.update_times.add(time.perf_counter() - start)

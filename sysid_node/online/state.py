@@ -31,7 +31,7 @@ from sysid_node.online.regression.weak_instruments import AndersonRubinBounds
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.status import Codes, Vocabulary
 from sysid_node.online.systematic.budget import Budget
-from sysid_node.online.systematic.estimation import Rival, SystematicErrors
+from sysid_node.online.systematic.estimation import AlternativeSolution, SystematicErrors
 from sysid_node.online.systematic.imperfections import Imperfections
 from sysid_node.online.systematic.rate_limited_moves import RateLimitedMoves
 from sysid_node.online.systematic.servo_model import ServoModel
@@ -87,7 +87,7 @@ class EstimatorModel:
 class ValidityBasis:
     """Criteria of validity of the D estimates that do not change between renewals."""
 
-    unobjected: NDArray[np.bool_]  # (D,) whether all criteria evaluated at the renewal are met
+    without_objection: NDArray[np.bool_]  # (D,) whether all criteria evaluated at the renewal are met
     objections: Codes  # (D,) status by the criteria evaluated at the renewal, 0 = ok
     reasons: Codes  # (D,) what is said of those that are not valid, unless a sample says more
     open: NDArray[np.bool_]  # (D,) whether a sample may say more: where nothing is objected
@@ -213,7 +213,8 @@ class ServoSearch:
 
     energy: float = 0.0  # s of data when the last one was tried
     tried: int = 0  # how many have been
-    rivals: dict[int, Rival] = field(default_factory=dict)  # by the control's place among those not exactly known
+    #: By the control's place among those that are not exactly known.
+    alternatives: dict[int, AlternativeSolution] = field(default_factory=dict)
 
 
 @dataclass

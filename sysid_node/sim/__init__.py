@@ -13,11 +13,10 @@ every other derivative). ``simulator.initial(V, alpha, beta, euler, rates)`` mak
 ``rollout`` and ``initial`` are pure: ``jax.vmap`` and ``jax.jacfwd`` may transform them. Surfaces, thrust and gusts are
 linear between samples.
 
-``prediction`` evaluates the same chain on measured signals without integrating the motion:
-``predict_coefficients(simulator, theta, signals_of(simulator, record))`` and its derivatives. ``flying`` simulates
-whole flights (trim, turbulence, autopilot, noise), or one sample at a time, and writes them as messages; ``signals``
-makes turbulence, and ``export`` writes other simulators' models. The page docs/reference/effects.md describes every
-effect.
+``prediction`` evaluates the same chain on measured signals without integrating the motion: ``predict_accelerations``
+gives the accelerations, ``coefficients`` the coefficients that they show. ``flying`` simulates whole flights (trim,
+turbulence, autopilot, noise), or one sample at a time, and writes them as messages; ``signals`` makes turbulence, and
+``export`` writes other simulators' models. The page docs/reference/effects.md describes every effect.
 
 Everything is SI, radians, body axes forward-right-down, float64.
 """

@@ -19,7 +19,7 @@ def test_the_document_is_json_and_its_shares_add_up(lagging) -> None:
 
 
 def test_what_is_doubted_is_told(lagging) -> None:
-    attribution = replace(lagging.attribution, causes=(), doubted=lagging.attribution.causes)
+    attribution = replace(lagging.attribution, causes=(), rejected=lagging.attribution.causes)
     found = replace(lagging, attribution=attribution)
     assert [c["effect"] for c in document(found)["doubted"]] == ["actuator_lag"]
     assert document(found)["doubted"][0]["parameters"] == document(lagging)["causes"][0]["parameters"]
@@ -34,7 +34,7 @@ def test_the_best_of_the_list_is_not_there_for_that(lagging) -> None:
     best, *others = document(lagging)["candidates"]
     assert (best["effect"], best["probability"]) == ("actuator_lag", cause.probability)
     assert best["share"] + sum(c["share"] for c in others) == pytest.approx(1.0)
-    found = replace(lagging, attribution=replace(lagging.attribution, causes=(), doubted=()))
+    found = replace(lagging, attribution=replace(lagging.attribution, causes=(), rejected=()))
     best, *others = document(found)["candidates"]
     assert best["share"] > 0.9 and {c["probability"] for c in (best, *others)} == {None}
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from due_times import due_times
 from harness import ROOT, START_NS, Probe, ended, identifier, made_up_streams, start_identifier
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
@@ -24,7 +25,6 @@ from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.bag.writer import write_streams
 from sysid_node.flight.streams import Arrival, Streams
 from sysid_node.online.alignment.in_pieces import align_streams
-from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import Estimates

@@ -6,12 +6,12 @@ import time
 from pathlib import Path
 
 import numpy as np
+from due_times import due_times
 from harness import LOSSLESS, Probe, ended, start, start_identifier
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.online.alignment.in_pieces import align_streams
-from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.ros.support.conversion import estimates_from_message, stamp_ns

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from due_times import due_times
 from harness import ROOT, START_NS, made_up_streams
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.streams import Streams
 from sysid_node.online.alignment.in_pieces import align_streams
-from sysid_node.online.alignment.schedule import due_times
 from sysid_node.online.replay import run
 from sysid_node.online.session import Due, Session
 from sysid_node.online.settings import OnlineSettings

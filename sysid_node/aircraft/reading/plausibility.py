@@ -1,6 +1,8 @@
 """Warnings of values that are possible, but that no aircraft has: most are in another unit than the file's.
 
 The limits are wide on purpose. A wrong unit moves a value by a factor of ten at least, and an unusual aircraft by two.
+They are checked whenever a file is read. ``dynamics.handbook.unusual`` has narrower ranges, which need level flight and
+modes too, for the page of ``sysid aircraft``.
 """
 
 from __future__ import annotations

@@ -119,7 +119,7 @@ def _group(
     ys = (measured - tables).T
     start = np.concatenate([np.linalg.lstsq(X, y, rcond=None)[0] for X, y in zip(Xs, ys, strict=True)])
     through = _ThroughNetwork(weights, state, target, Xs, (scales[1][0] - tables, scales[1][1]))
-    theta = least_squares(through.misfit, start, through.jacobian, x_scale="jac", max_nfev=30).x
+    theta = least_squares(through.flat_residual, start, through.jacobian, x_scale="jac", max_nfev=30).x
     return _regressions(structure, theta, through, flights)
 
 
@@ -149,12 +149,12 @@ class _ThroughNetwork:
         by_coefficient = np.asarray(network_slope(self.weights, self.state, self._inputs(theta))) / self.spread
         return np.concatenate([by_coefficient[:, :, i, None] * X[:, None, :] for i, X in enumerate(self.Xs)], axis=2)
 
-    def misfit(self, theta: Array) -> Array:
+    def flat_residual(self, theta: Array) -> Array:
         """``residual`` as one vector."""
         return self.residual(theta).ravel()
 
     def jacobian(self, theta: Array) -> Array:
-        """The Jacobian of ``misfit``."""
+        """The Jacobian of ``flat_residual``."""
         return -self.slopes(theta).reshape(-1, theta.size)
 
 

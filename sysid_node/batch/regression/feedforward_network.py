@@ -61,11 +61,11 @@ def train_network(inputs: Array, target: Array) -> Weights:
     start = np.concatenate([0.3 * rng.standard_normal(ends[2]), linear.ravel()])
     value, slope = jax.jit(residual), jax.jit(jax.jacfwd(residual))
 
-    def misfit(w: Array) -> Array:
+    def penalised(w: Array) -> Array:
         return np.asarray(value(w))
 
     def jacobian(w: Array) -> Array:
         return np.asarray(slope(w))
 
-    solution = least_squares(misfit, start, jacobian, method="lm", max_nfev=60)
+    solution = least_squares(penalised, start, jacobian, method="lm", max_nfev=60)
     return unpack(jnp.asarray(solution.x))

@@ -79,11 +79,11 @@ class _OneFlight(NamedTuple):
 
 def flight_posterior(passes: Sequence[EstimatorState]) -> FlightPosterior | None:
     """The posterior after the ``online_passes`` of all flights; None where all is exact, or none can be used."""
-    told = [one for state in passes if (one := _told(state)) is not None]
-    return _combined(told) if told else None
+    posteriors = [one for state in passes if (one := _posterior_of(state)) is not None]
+    return _combined(posteriors) if posteriors else None
 
 
-def _told(state: EstimatorState) -> _OneFlight | None:
+def _posterior_of(state: EstimatorState) -> _OneFlight | None:
     imperfect, latest = state.model.imperfections, state.latest
     if imperfect is None or latest is None or latest.systematic is None:
         return None
@@ -119,13 +119,13 @@ def _named(imperfect: Imperfections, *, commanded: bool) -> tuple[Imperfection, 
     return tuple(Imperfection(key, role, commanded and role != "source") for key, role in zip(keys, roles, strict=True))
 
 
-def _combined(told: Sequence[_OneFlight]) -> FlightPosterior:
+def _combined(posteriors: Sequence[_OneFlight]) -> FlightPosterior:
     """The product of what all flights tell, with the tolerances of those that name an imperfection first."""
-    every = tuple(dict.fromkeys(one for flight in told for one in flight.imperfections))
-    K, D = len(every), len(told[0].names)
+    every = tuple(dict.fromkeys(one for flight in posteriors for one in flight.imperfections))
+    K, D = len(every), len(posteriors[0].names)
     sigmas, expected = np.zeros(K), np.zeros(K)
     information, score, jacobian, weight = np.eye(K), np.zeros(K), np.zeros((K, D)), np.zeros(K)
-    for flight in told:
+    for flight in posteriors:
         at = np.array([every.index(one) for one in flight.imperfections], np.intp)
         new = sigmas[at] == 0.0
         sigmas[at[new]], expected[at[new]] = flight.sigmas[new], flight.expected[new]
@@ -138,12 +138,12 @@ def _combined(told: Sequence[_OneFlight]) -> FlightPosterior:
         jacobian[at] += flight.seconds * flight.jacobian
         weight[at] += flight.seconds
     covariance = np.linalg.inv(information)
-    step_time = max(flight.step_time for flight in told)
+    step_time = max(flight.step_time for flight in posteriors)
     late = np.array([one.role == "lateness" and one.commanded for one in every])
     return FlightPosterior(
         every,
         expected + sigmas * (covariance @ score),
         sigmas[:, None] * covariance * sigmas + np.diag(step_time**2 * late),
-        told[0].names,
+        posteriors[0].names,
         jacobian / np.maximum(weight, 1e-9)[:, None],
     )

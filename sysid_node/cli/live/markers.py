@@ -5,16 +5,14 @@ It needs the message packages ``tf2_msgs`` and ``visualization_msgs``, which com
 
 from __future__ import annotations
 
-import os
-import sys
-from functools import partial
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.cli.live.viewer_program import run_viewer, watched_flight
 from sysid_node.errors import InputError
-from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, check_each
+from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter
 from sysid_node.view.live import LiveScene
 from sysid_node.view.markers import SAME, Trail, Triangles, fixed_parts, moving_parts, pose_of
 from sysid_node.view.scene import GREY, ORANGE, PALE, VERMILION, Body, Colour
@@ -24,7 +22,6 @@ if TYPE_CHECKING:
 
 PERIOD = 0.05  # s between two poses
 NEEDED = ("tf2_msgs", "visualization_msgs")
-_NICE = 10  # lower priority than the identifier's: on a busy computer the picture waits, not the flight
 _TEXT_ABOVE = 0.6  # height of the text above the aircraft, spans
 _LETTERS, _LINE = 0.15, 0.01  # height of a letter and width of the trail, spans
 
@@ -150,34 +147,16 @@ def _points(corners: Any) -> list[Any]:
 
 def main() -> None:
     """Entry point of ``ros2 run sysid_node markers``."""
-    import sysid_node.ros  # noqa: F401, PLC0415  # finds sysid_msgs in a virtual environment
-    from sysid_node.ros.support.spin import help_text, run_program  # noqa: PLC0415
-
-    if {"-h", "--help"} & set(sys.argv[1:]):
-        print(help_text("markers", __doc__ or "", PARAMETERS))
-        return
-    sys.exit(run_program(_serve))
+    run_viewer("markers", __doc__ or "", PARAMETERS, _serve)
 
 
 def _serve() -> None:
     import rclpy  # noqa: PLC0415
 
-    from sysid_node.ros.support.declaring import declare, values_of  # noqa: PLC0415
-    from sysid_node.ros.support.flight_watch import FlightWatch  # noqa: PLC0415
-
     require_packages()
-    os.nice(_NICE)
-    watch = FlightWatch(name="markers")
-    try:
-        declare(watch.node, PARAMETERS, partial(check_each, PARAMETERS))
-        given = values_of(watch.node, PARAMETERS)
-        if not given["aircraft"]:
-            raise InputError("parameter aircraft is empty: give a name or a file, e.g. --ros-args -p aircraft:=cdrw")
-        watch.frame = given["body_frame"]
+    with watched_flight(PARAMETERS, name="markers") as (watch, given):
         frames = given["world_frame"], given["aircraft_frame"], given["transforms"]
         publisher = MarkerPublisher(load_aircraft(given["aircraft"]), watch, *frames)
         while rclpy.ok():
             watch.listen(PERIOD)
             publisher.publish()
-    finally:
-        watch.close()

@@ -7,17 +7,16 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.cli.live.processes import started
-from sysid_node.errors import InputError
+from sysid_node.cli.live.viewer_program import NICE, run_viewer, watched_flight
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.interruption import on_interrupt
-from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, check_each
+from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter
 from sysid_node.view.live import LiveScene
 from sysid_node.view.recording import append, check_recording, open_file, open_window, require_rerun, say
 
@@ -42,7 +41,6 @@ WINDOW = Path("-")
 PERIOD = 0.2  # s between two updates of the screen
 LOG = "view.log"
 _PATIENCE = 5.0  # s for the viewer to take the last news
-_NICE = 10  # lower priority than the identifier's: on a busy computer the screen waits, not the flight
 
 
 def watch_live(aircraft: Aircraft, save: Path | None, frame: BodyFrame) -> None:
@@ -52,7 +50,7 @@ def watch_live(aircraft: Aircraft, save: Path | None, frame: BodyFrame) -> None:
 
     from sysid_node.ros.support.flight_watch import FlightWatch  # noqa: PLC0415
 
-    os.nice(_NICE)
+    os.nice(NICE)
     scene = LiveScene(aircraft)
     stream = _opened(scene, save)
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
@@ -115,29 +113,11 @@ def viewer_beside(aircraft: str, wanted: Path | None, folder: Path) -> Iterator[
 
 def main() -> None:
     """Entry point of ``ros2 run sysid_node view``."""
-    import sysid_node.ros  # noqa: F401, PLC0415  # finds sysid_msgs in a virtual environment
-    from sysid_node.ros.support.spin import help_text, run_program  # noqa: PLC0415
-
-    if {"-h", "--help"} & set(sys.argv[1:]):
-        print(help_text("view", __doc__ or "", PARAMETERS))
-        return
-    sys.exit(run_program(_serve))
+    run_viewer("view", __doc__ or "", PARAMETERS, _serve)
 
 
 def _serve() -> None:
-    from sysid_node.ros.support.declaring import declare, values_of  # noqa: PLC0415
-    from sysid_node.ros.support.flight_watch import FlightWatch  # noqa: PLC0415
-
     require_rerun()
-    os.nice(_NICE)
-    watch = FlightWatch()
-    try:
-        declare(watch.node, PARAMETERS, partial(check_each, PARAMETERS))
-        given = values_of(watch.node, PARAMETERS)
-        if not given["aircraft"]:
-            raise InputError("parameter aircraft is empty: give a name or a file, e.g. --ros-args -p aircraft:=cdrw")
-        watch.frame = given["body_frame"]
+    with watched_flight(PARAMETERS) as (watch, given):
         scene = LiveScene(load_aircraft(given["aircraft"]))
         _show(scene, watch, _opened(scene, Path(given["save"]) if given["save"] else None))
-    finally:
-        watch.close()

@@ -4,6 +4,7 @@ A finding is a question to the file's author and no error: a fighter may be unst
 conventions: elevator trailing edge down, right aileron trailing edge down and rudder trailing edge left are positive.
 The sources give the signs and the kind of values; the ranges' ends are a choice, wide about aircraft as in Roskam
 (2001), "Airplane Flight Dynamics", app. B, and Beard & McLain (2012), "Small Unmanned Aircraft", app. E.
+``aircraft.reading.plausibility`` has wider limits, of what no aircraft has, and warns whenever a file is read.
 """
 
 from __future__ import annotations

@@ -21,8 +21,8 @@ class Population:
 
     ``apart`` (J,) is how far each tail's own mean lies from the mean of the other tails, ``apart_error`` (J,) the
     standard error of that distance with the scatter of the other tails, and ``apart_p`` (J,) its p-value (Student's
-    t; NaN with fewer than three other tails). ``owed`` (N,) is the weight that the fleet has in the combination of
-    each flight's estimate with what the fleet's other flights tell of its tail.
+    t; NaN with fewer than three other tails). ``fleet_weight`` (N,) is the weight that the fleet has in the
+    combination of each flight's estimate with what the fleet's other flights tell of its tail.
     """
 
     series: DerivativeSeries
@@ -30,7 +30,7 @@ class Population:
     apart: Array
     apart_error: Array
     apart_p: Array
-    owed: Array
+    fleet_weight: Array
 
     @property
     def key(self) -> tuple[str, str]:
@@ -41,7 +41,7 @@ class Population:
 def population_of(series: DerivativeSeries) -> Population:
     """The population of the series of one type and derivative."""
     fit = fit_random_effects(series.value, series.statistical, series.systematic, series.tail)
-    return Population(series, fit, *_apart(series, fit), _owed(series, fit))
+    return Population(series, fit, *_apart(series, fit), _fleet_weight(series, fit))
 
 
 def _apart(series: DerivativeSeries, fit: RandomEffects) -> tuple[Array, Array, Array]:
@@ -65,7 +65,7 @@ def _apart(series: DerivativeSeries, fit: RandomEffects) -> tuple[Array, Array, 
     return distance, error, np.asarray(2.0 * stats.t.sf(np.abs(distance) / error, J - 2))
 
 
-def _owed(series: DerivativeSeries, fit: RandomEffects) -> Array:
+def _fleet_weight(series: DerivativeSeries, fit: RandomEffects) -> Array:
     """Weight (N,) of the fleet's other flights in each flight's combined estimate.
 
     The systematic error is common to both and drops out of the weights.

@@ -73,16 +73,14 @@ class RandomEffects:
     freedom: int  # of the scatter of flights: flights less tails
 
 
-def fit_random_effects(
-    value: Array, statistical: Array, systematic: Array, tail: NDArray[np.intp], *, bracket: bool = True
-) -> RandomEffects:
+def fit_random_effects(value: Array, statistical: Array, systematic: Array, tail: NDArray[np.intp]) -> RandomEffects:
     """The model of estimates ``value`` (N,) with standard errors ``statistical`` and ``systematic`` (N,).
 
     ``tail`` (N,) numbers the tails from 0. The systematic errors count as common to the type, which gives the mean its
     widest interval. The interval of the tails' scatter holds both where they are common and where they are each
-    tail's own: its lower end is that of the latter (unless ``bracket`` is False, which takes half the time). With one
-    tail, its scatter is NaN. With one flight a tail, the scatter of flights is NaN (the two cannot be told apart), and
-    all scatter counts as that of tails.
+    tail's own: its lower end is that of the latter. With one tail, its scatter is NaN. With
+    one flight a tail, the scatter of flights is NaN (the two cannot be told apart), and all scatter counts as that of
+    tails.
 
     Raises ValueError where there is no flight or a statistical error is not positive.
     """
@@ -90,7 +88,7 @@ def fit_random_effects(
         raise ValueError("a random-effects model needs at least one flight and positive statistical errors")
     data = _Data.of(value, statistical, systematic, tail)
     common = _profile(data, shared=1.0)
-    own = _profile(data, shared=0.0) if bracket and data.J > 1 and systematic.any() else common
+    own = _profile(data, shared=0.0) if data.J > 1 and systematic.any() else common
     tails = Scatter(common.tau.value, min(own.tau.lower, common.tau.lower), max(own.tau.upper, common.tau.upper))
     return _estimates(data, common, tails)
 

@@ -117,7 +117,7 @@ def _population(population: Population) -> dict[str, Any]:
             }
             for j, tail in enumerate(series.tails)
         ],
-        "owed_to_fleet": {flight: _number(w) for flight, w in zip(series.flight, population.owed, strict=True)},
+        "owed_to_fleet": {flight: _number(w) for flight, w in zip(series.flight, population.fleet_weight, strict=True)},
     }  # fmt: skip
 
 

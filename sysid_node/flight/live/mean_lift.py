@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,10 +19,20 @@ from sysid_node.flight.record import Array, FlightRecord
 
 REMEMBERED = 10.0  # s over which the means in flight are taken
 EVERY = 0.05  # s between the samples that count in flight
-_RATIO = 2.5  # of two lift coefficients, or airspeeds, from which they do not go together
+LARGEST_RATIO = 2.5  # of two lift coefficients, or airspeeds, from which they do not agree
+STALL_ANGLE = 0.15  # rad, mean angle of attack from which a loss of lift may be a stall
 _VANE_ERROR = 0.05  # rad: bias of a vane that is not remarkable
-_KNOWN = 0.9  # share of the samples in which the angle of attack must be measured
-_STALL_ANGLE = 0.15  # rad, mean angle of attack from which a loss of lift may be a stall
+_MEASURED = 0.9  # share of the samples in which the angle of attack must be measured
+_LARGEST_ANGLE = 1.0  # rad, mean angle of attack from which the angle is not in rad
+
+
+@dataclass(frozen=True)
+class LiftLimits:
+    """How far the measured mean lift coefficient may be from the one by the aircraft file."""
+
+    ratio: float = LARGEST_RATIO  # of the two, or its inverse, from which they do not agree
+    vane_error: float = _VANE_ERROR  # rad, bias of a vane that may account for the difference
+    stall_angle: float = STALL_ANGLE  # rad, mean angle of attack from which a loss of lift may be a stall
 
 
 class MeanLift:
@@ -52,7 +63,7 @@ class MeanLift:
         if self.seconds < AVERAGED or not self._sums["pressure"]:
             return
         lift = self._sums["lift"] / (self._sums["pressure"] * self.aircraft.geometry.S)
-        known = self._angles >= _KNOWN * self._count
+        known = self._angles >= _MEASURED * self._count
         alpha = self._sums["alpha"] / self._angles if known else math.nan
         fault = fault_of(self.aircraft, lift, self._sums["airspeed"] / self._count, alpha)
         if fault:
@@ -86,10 +97,10 @@ class RecentMeanLift:
         Nothing is said at low airspeed, where wheels may carry the aircraft.
         """
         lift, pressure, airspeed, alpha, known = self._means
-        slow = airspeed < self.aircraft.reference.airspeed / math.sqrt(_RATIO)
+        slow = airspeed < self.aircraft.reference.airspeed / math.sqrt(LARGEST_RATIO)
         if self.seconds < REMEMBERED or slow or not pressure:
             return ""
-        angle = alpha / known if known >= _KNOWN else math.nan
+        angle = alpha / known if known >= _MEASURED else math.nan
         return fault_of(self.aircraft, lift / (pressure * self.aircraft.geometry.S), airspeed, angle)
 
 
@@ -98,12 +109,12 @@ def fault_of(aircraft: Aircraft, lift: float, airspeed: float, alpha: float) -> 
     expected = _expected(aircraft, alpha)
     if math.isnan(expected):
         return _airspeed_fault(aircraft, airspeed, lift)
-    if _go_together(aircraft, lift, expected, alpha):
+    if lift_agrees(lift, expected, alpha, aircraft.derivatives["CL_alpha"].value):
         return ""
     return (
         f"mean lift coefficient is {lift:.2f} by the weight, the wing area and the mean airspeed of "
         f"{airspeed:.1f} m/s, and {expected:.2f} by the angle of attack and the derivatives of "
-        f"{aircraft.name!r}: {doubts()}"
+        f"{aircraft.name!r}: {likely_mistakes()}"
     )
 
 
@@ -116,25 +127,32 @@ def _expected(aircraft: Aircraft, alpha: float) -> float:
     return offset + derivatives["CL_alpha"].value * alpha
 
 
-def _go_together(aircraft: Aircraft, lift: float, expected: float, alpha: float) -> bool:
-    slope = abs(aircraft.derivatives["CL_alpha"].value)
-    stalled = 0.0 < lift < expected and _STALL_ANGLE < alpha < 1.0
-    alike = lift * expected > 0.0 and 1.0 / _RATIO < lift / expected < _RATIO
-    return alike or stalled or abs(lift - expected) < _VANE_ERROR * slope
+def lift_agrees(lift: float, expected: float, alpha: float, slope: float, limits: LiftLimits | None = None) -> bool:
+    """Whether a measured mean lift coefficient agrees with the one that the aircraft file gives.
+
+    ``alpha`` (rad) is the mean angle of attack, NaN where no vane measured it: then neither an error of the vane nor a
+    stall can account for a difference. ``slope`` is CL_alpha (per rad).
+    """
+    limits = limits or LiftLimits()
+    alike = lift * expected > 0.0 and 1.0 / limits.ratio < lift / expected < limits.ratio
+    if alike or math.isnan(alpha):
+        return alike
+    stalled = 0.0 < lift < expected and limits.stall_angle < alpha < _LARGEST_ANGLE
+    return stalled or abs(lift - expected) < limits.vane_error * abs(slope)
 
 
 def _airspeed_fault(aircraft: Aircraft, airspeed: float, lift: float) -> str:
     reference = aircraft.reference.airspeed
-    if 1.0 / _RATIO < airspeed / reference < _RATIO:
+    if 1.0 / LARGEST_RATIO < airspeed / reference < LARGEST_RATIO:
         return ""
     return (
         f"mean airspeed is {airspeed:.1f} m/s, a lift coefficient of {lift:.2f}; the derivatives of "
-        f"{aircraft.name!r} hold for {reference:g} m/s: {doubts()}"
+        f"{aircraft.name!r} hold for {reference:g} m/s: {likely_mistakes()}"
     )
 
 
-def doubts() -> str:
-    """What to look for where the lift is not the aircraft's."""
+def likely_mistakes() -> str:
+    """The question that ends a message where the mean lift does not agree with the aircraft file."""
     return "is the airspeed in m/s, the angle of attack in rad, the mass in kg, or is it another aircraft's flight?"
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, Nuisances
-from sysid_node.gap.estimation.spectral_weights import noise_pull, real_rows, residual_power, weights
+from sysid_node.gap.estimation.spectral_weights import noise_gradient, real_rows, residual_power, weights
 from sysid_node.gap.residuals.parameter_priors import bounds, prior
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import Complex
@@ -39,7 +39,7 @@ class FlightFit:
     @property
     def weights(self) -> Array:
         """Weights (2 L, 12) of the residual's real and imaginary parts."""
-        return weights(self.model.windows, self.power)
+        return weights(self.power)
 
     @property
     def residual(self) -> Complex:
@@ -181,15 +181,15 @@ class CandidateFit:
         chosen = np.isin(nuisances.indices, self.widened) & self.uncertain[first + nuisances.places(0)]
         return float(np.log(nuisances.factors[chosen]).sum())
 
-    def noise_pull_on(self, indices: Sequence[int]) -> Array:
-        """Pull (unknowns,) that corrects for the noise of the regressors, see ``spectral_weights.noise_pull``.
+    def noise_gradient_on(self, indices: Sequence[int]) -> Array:
+        """Pull (unknowns,) that corrects for the noise of the regressors, see ``spectral_weights.noise_gradient``.
 
         ``indices`` are the entries of the parameter vector that come before the nuisance parameters.
         """
         pull = np.zeros(len(indices) + self.stacked[0].size)
         for number, flight in enumerate(self.flights):
             entries, count = [*indices, *flight.nuisances.indices], flight.model.windows.count
-            own = noise_pull(flight.model, flight.power, flight.point, entries, count)
+            own = noise_gradient(flight.model, flight.power, flight.point, entries, count)
             pull[self.places_of(number, len(indices))] += own
         return pull
 

@@ -27,7 +27,7 @@ from sysid_node.gap.estimation.spectral_weights import (
     amplitudes,
     excess_squares,
     line_shares,
-    noise_pull,
+    noise_gradient,
     real_rows,
     residual_power,
     spectral_deviance,
@@ -141,11 +141,11 @@ def cross_validated_evidence(fit: CandidateFit) -> Evidence:
             others = np.setdiff1d(np.arange(model.windows.count), aside)
             J, r = slopes[aside].reshape(-1, slopes.shape[2]), flight.rows[aside].ravel()
             information = elsewhere[number] + gram[others].sum(axis=0)
-            pull = _noise_pull(fit, number, flight.power, flight.point, aside.size)
+            pull = _noise_gradient(fit, number, flight.power, flight.point, aside.size)
             step = -solve(information, J.T @ r + pull)
             power = residual_power(model, residual[others], flight.point) if others.size > 2 else flight.power
             there = stepped(fit, step).flights[number].point
-            pull = _noise_pull(fit, number, power, there, group.size)
+            pull = _noise_gradient(fit, number, power, there, group.size)
             part = _Group(model, flight.power, flight.rows[group], slopes[group], there, pull)
             score, predicted[group] = _predictive(part, power, step, information)
             scores.append(score)
@@ -154,11 +154,11 @@ def cross_validated_evidence(fit: CandidateFit) -> Evidence:
     return Evidence(np.array(scores) + fit.prior_score / len(scores), tuple(flights))
 
 
-def _noise_pull(fit: CandidateFit, number: int, power: Array, point: Array, windows: int) -> Array:
+def _noise_gradient(fit: CandidateFit, number: int, power: Array, point: Array, windows: int) -> Array:
     """Pull (unknowns,) of the regressors' noise in so many windows of one flight; zero on what is not uncertain."""
     pull, flight = np.zeros(fit.uncertain.size), fit.flights[number]
     entries = [*fit.indices, *flight.nuisances.indices]
-    pull[fit.places_of(number, len(fit.indices))] = noise_pull(flight.model, power, point, entries, windows)
+    pull[fit.places_of(number, len(fit.indices))] = noise_gradient(flight.model, power, point, entries, windows)
     return np.asarray(pull * fit.uncertain)
 
 
@@ -205,7 +205,7 @@ def held_out_evidence(fit: CandidateFit, held_out: Sequence[HeldOutFlight]) -> E
         model, kept = flight.model, _kept_nuisances(fit, flight)
         point = transferred_parameters(fit, model)
         power = np.where(model.axes, np.maximum(_mean_power(fit, model), model.noise), 1.0)
-        weight = weights(model.windows, power)
+        weight = weights(power)
         order = [*fit.indices, *_shared_first(kept)]
         rows = real_rows(model.residual(point), weight)
         slopes = real_rows(model.slopes(point, order), weight)
@@ -216,7 +216,7 @@ def held_out_evidence(fit: CandidateFit, held_out: Sequence[HeldOutFlight]) -> E
         beyond = excess_squares(model, power, point, model.windows.count)
         level, groups = noise_levels(rows, slopes, information, beyond), window_groups(model)
         for group in groups:
-            pull = noise_pull(model, power * level, point, order, group.size)
+            pull = noise_gradient(model, power * level, point, order, group.size)
             pull[:common] *= fit.uncertain[:common]
             part = _Group(model, power, rows[group], slopes[group], point, pull)
             scores.append(_predictive(part, power * level, np.zeros(len(order)), information)[0])
@@ -329,7 +329,7 @@ def _predictive(group: _Group, power: Array, step: Array, information: Array) ->
     spread = windows * float(np.sum(line_shares(group.model) * np.log(power) * group.model.axes))
     squares = float(scaled @ scaled) - float(excess_squares(group.model, power, group.point, windows).sum())
     score = -0.5 * (spread + squares) + 0.5 * float(right @ solve(gained, right)) - 0.5 * (after - before)
-    return score, amplitudes(change, weights(group.model.windows, group.power))
+    return score, amplitudes(change, weights(group.power))
 
 
 def probabilities(scores: Sequence[Array], seed: int = 0) -> Array:

@@ -13,10 +13,10 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
-from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex, Windows
+from sysid_node.gap.residuals.windowed_spectra import INDEPENDENT_SHARE, Complex
 
 
-def weights(windows: Windows, power: Array) -> Array:
+def weights(power: Array) -> Array:
     """Weights (2 L, 12) of the real parts, then of the imaginary parts, for noise of a power (L, 12).
 
     The line at zero frequency has no imaginary part.
@@ -71,7 +71,7 @@ def excess_squares(model: ResidualModel, power: Array, theta: Array, windows: in
     return np.asarray(windows * np.sum(line_shares(model) * model.excess_noise(theta) / power * model.axes, axis=0))
 
 
-def noise_pull(model: ResidualModel, power: Array, theta: Array, indices: Sequence[int], windows: int) -> Array:
+def noise_gradient(model: ResidualModel, power: Array, theta: Array, indices: Sequence[int], windows: int) -> Array:
     """Half the slope (K,) of the sum of ``excess_squares`` with respect to these entries of the parameters (P,).
 
     It is the gradient by which least squares of weighted rows is corrected for the noise of the regressors.

@@ -70,7 +70,7 @@ class VariableProjection:
         A linear term in the logarithm of a Gaussian density moves its centre.
         """
         self.file_centre, self.sigma = prior(self.fit.simulator, self.indices)
-        pull = self.fit.noise_pull_on(self.indices)
+        pull = self.fit.noise_gradient_on(self.indices)
         self.centre = self.file_centre + self.sigma**2 * pull[: len(self.indices)]
         self.nuisance_centre = self.spread**2 * pull[len(self.indices) :]
 

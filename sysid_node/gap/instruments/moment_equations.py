@@ -90,7 +90,7 @@ def prior_terms(fit: CandidateFit) -> tuple[Array, Array]:
 
 def weights_without_mean(model: ResidualModel, power: Array) -> Array:
     """Weights (2 L, 12) of the residual's real and imaginary parts; zero at zero frequency."""
-    weight = weights(model.windows, power)
+    weight = weights(power)
     weight[[0, model.windows.frequencies.size]] = 0.0
     return weight
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from sysid_node.errors import InputError
-from sysid_node.flight.live.mean_lift import doubts
+from sysid_node.flight.live.mean_lift import LiftLimits, lift_agrees, likely_mistakes
 from sysid_node.flight.record import Array
 from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.residuals.residual_model import ResidualModel
@@ -38,13 +39,12 @@ def require_admissible(model: ResidualModel, limits: Admission = THRESHOLDS.admi
         )
     lift, expected = model.series[:, 0].mean(), model.predicted_series(model.simulator.neutral())[:, 0].mean()
     slope = model.simulator.aircraft.derivatives.get("CL_alpha")
-    measured = not model.flight.inferred
-    by_a_vane = slope is not None and abs(lift - expected) < limits.vane_error * slope.value and measured
-    stalled = lift < expected and measured and model.record["alpha"].mean() > limits.stall_angle
-    if not (1.0 / limits.lift_ratio < lift / expected < limits.lift_ratio or by_a_vane or stalled):
+    alpha = math.nan if model.flight.inferred else model.record["alpha"].mean()
+    lift_limits = LiftLimits(limits.lift_ratio, limits.vane_error, limits.stall_angle)
+    if not lift_agrees(lift, expected, alpha, slope.value if slope else 0.0, lift_limits):
         raise InputError(
             f"{model.flight.source}: mean CL is {lift:.2f} by the mass and wing area of "
-            f"{model.simulator.aircraft.name!r}, not {expected:.2f} as in its file; {doubts()}{_or_imu(model)}"
+            f"{model.simulator.aircraft.name!r}, not {expected:.2f} as in its file; {likely_mistakes()}{_or_imu(model)}"
         )
     return model
 

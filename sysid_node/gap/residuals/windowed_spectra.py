@@ -48,11 +48,11 @@ class Windows:
     highest: float = HIGHEST_FREQUENCY
 
     @classmethod
-    def over(cls, samples: int, rate: float, length: float = LENGTH, highest: float = HIGHEST_FREQUENCY) -> Windows:
-        """Windows of about this length, s, that fill a flight of so many samples except its ends."""
+    def over(cls, samples: int, rate: float, highest: float = HIGHEST_FREQUENCY) -> Windows:
+        """Windows of about ``LENGTH`` s that fill a flight of so many samples except its ends."""
         first = round(MARGIN * rate)
         inner = samples - 2 * first
-        halves = max(2, round(2.0 * inner / min(length * rate, inner / LEAST_WINDOWS)))
+        halves = max(2, round(2.0 * inner / min(LENGTH * rate, inner / LEAST_WINDOWS)))
         return cls(rate, 2 * (inner // halves), halves - 1, first, highest)
 
     @property

@@ -248,7 +248,7 @@ def is_favoured_by_derivatives(
 ) -> bool:
     """Whether the derivatives' joint prior favours the candidate beyond doubt, and they are plausible with it.
 
-    A mass that is a fifth off shifts every coefficient by two tolerances. Each alone is excused; that all are is not:
+    A mass that is a fifth off moves each coefficient by two tolerances. Each alone is plausible, together they are not:
     so many independent draws are less probable than one common cause. The logarithm of the ratio of the two joint prior
     densities is half the difference of the squared distances, each beyond its expectation, less what the density loses
     where the candidate is a gross error of derivatives and their priors are wider.

@@ -26,7 +26,7 @@ class CauseEvidence:
     """The evidence for and against one cause, the other causes given."""
 
     log_bayes_factor: float  # nats by which what the commands predict is better accounted for with the cause
-    misfit: float  # amplitude of what is left and depends on the cause, as a share of what the cause does
+    misspecification: float  # amplitude of what is left and depends on the cause, as a share of what the cause does
     flexible: bool  # the effect acts as other values of the file's derivatives
     windows: float = THRESHOLDS.calibration.windows  # in which the commands excite the flights (effective number)
     by_tolerances: float = 0.0  # nats of it that the joint prior of the derivatives gives
@@ -49,11 +49,14 @@ def evidence_of(
     """
     flexible = effect in thresholds.calibration.flexible_effects
     prior = max(min(by_tolerances, log_bayes_factor), 0.0)
-    return CauseEvidence(log_bayes_factor, misfit_of(tested, thresholds), flexible, windows, prior, searched)
+    return CauseEvidence(log_bayes_factor, misspecification_of(tested, thresholds), flexible, windows, prior, searched)
 
 
-def misfit_of(tested: Misspecification, thresholds: Thresholds = THRESHOLDS) -> float:
-    """The misfit: amplitude ratio over the channels on which the cause counts and the misfit is significant."""
+def misspecification_of(tested: Misspecification, thresholds: Thresholds = THRESHOLDS) -> float:
+    """Amplitude of what is left and depends on the cause, as a share of what the cause does.
+
+    Only channels count on which the cause counts and on which what is left is significant.
+    """
     limits = thresholds.calibration
     counts = tested.contributed > limits.counted * tested.contributed.sum()
     significant = counts & (tested.deviations > limits.deviations)
@@ -69,11 +72,11 @@ def calibrated_probability(evidence: CauseEvidence, thresholds: Thresholds = THR
 
 def is_misspecified(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> bool:
     """Whether too much of what is left depends on the cause: its equation is another, however large its support."""
-    return evidence.misfit > thresholds.calibration.misfit
+    return evidence.misspecification > thresholds.calibration.misspecification
 
 
 def is_supported_but_misspecified(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> bool:
-    """Whether the cause would be kept but for its misfit: then something is there, but not this effect."""
+    """Whether the cause would be kept but for its misspecification: then something is there, but not this effect."""
     likely = probability_by_support(evidence, thresholds) >= thresholds.calibration.probability
     return is_misspecified(evidence, thresholds) and likely
 
@@ -94,7 +97,7 @@ def prior_odds(effect: str, thresholds: Thresholds = THRESHOLDS) -> float:
 
 
 def probability_by_support(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> float:
-    """The larger of the logistic regression's probability and that by the tolerances, whatever the misfit."""
+    """The larger of the logistic regression's probability and that by the tolerances, misspecified or not."""
     log_odds = float(np.dot(thresholds.calibration.weights, regressors(evidence, thresholds)))
     by_tolerances = evidence.by_tolerances - float(np.log(evidence.searched))
     if evidence.by_tolerances > 0.0:

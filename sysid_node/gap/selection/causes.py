@@ -97,7 +97,7 @@ def variance_by_alternatives(cause: Cause, causes: Sequence[Cause]) -> Array:
     return variance
 
 
-#: An explanation, its causes, and the doubted ones.
+#: An explanation, its causes, and the rejected ones.
 Selection = tuple[FittedSet, tuple[Cause, ...], tuple[Cause, ...]]
 
 
@@ -107,28 +107,28 @@ def select_causes(
     chosen: FittedSet,
     stages: Sequence[list[FittedSet]],
     always: Sequence[Candidate],
-    doubted_before: Sequence[Cause] = (),
+    rejected_before: Sequence[Cause] = (),
 ) -> Selection:
-    """The explanation whose causes are all kept, these causes, the most probable first, and the doubted ones.
+    """The explanation whose causes are all kept, these causes, the most probable first, and the rejected ones.
 
     ``chosen`` is the explanation of the forward selection with its ``stages``; candidates that are ``always`` tried
-    are alternatives to any cause. ``base`` has nuisances only. What was ``doubted_before`` does not come back.
+    are alternatives to any cause. ``base`` has nuisances only. What was ``rejected_before`` does not come back.
     """
-    doubted = list(doubted_before)
+    rejected = list(rejected_before)
     challenged: frozenset[str] = frozenset()
     while True:
-        excluded = frozenset(cause.candidate.label for cause in doubted)
+        excluded = frozenset(cause.candidate.label for cause in rejected)
         chosen, positions = replace_stepwise(fitter, base, chosen, stages, always, excluded | challenged)
         causes = [_weighed(fitter, base, chosen, position, excluded) for position in positions]
         challenge = next_challenge([cause.table for cause in causes], challenged)
         if challenge is None:
             causes = [_with_late_imu(cause, chosen) for cause in causes]
-            return chosen, tuple(sorted(causes, key=lambda cause: -cause.probability)), tuple(doubted)
+            return chosen, tuple(sorted(causes, key=lambda cause: -cause.probability)), tuple(rejected)
         cause, position = causes[challenge.index], positions[challenge.index]
         challenged |= {cause.candidate.label}
         new = _successor(base, position, cause, excluded | challenged)
         if challenge.improbable:
-            doubted.append(replace(cause, replaced=new is not None))
+            rejected.append(replace(cause, replaced=new is not None))
         chosen = new or (position.without if challenge.improbable else chosen)
 
 

@@ -53,7 +53,7 @@ class Attribution:
     structure_before: OveridentificationTest  # of what the nuisances leave
     structure_left: OveridentificationTest  # of what the causes leave
     causes: tuple[Cause, ...]
-    doubted: tuple[Cause, ...]  # what predicts better, but is improbable
+    rejected: tuple[Cause, ...]  # what predicts better, but is improbable; ``doubted`` in gap.json
     ranking: tuple[tuple[str, float], ...]  # candidates fitted alone, and their probabilities, the best first
     first_stage: tuple[FittedSet, ...] = ()  # these candidates, fitted
     held_out: tuple[HeldOutFlight, ...] = ()
@@ -159,10 +159,10 @@ def attribute(
     always = [each for each in candidates if each.effect in RESPONSE_DELAYS | variants]
     selection = select_causes(fitter, base, chosen, stages, always)
     progress(0.9, "what else there is in place of causes that were dropped")
-    kept, causes, doubted = selection
-    if causes and (doubted or len(kept.fit.candidates) < len(chosen.fit.candidates)):
+    kept, causes, rejected = selection
+    if causes and (rejected or len(kept.fit.candidates) < len(chosen.fit.candidates)):
         selection = _selected_again(fitter, base, selection, stages, candidates, always)
-    chosen, causes, doubted = selection
+    chosen, causes, rejected = selection
     return Attribution(
         base=base,
         chosen=chosen,
@@ -170,7 +170,7 @@ def attribute(
         structure_before=overidentification_of(base.fit, chosen.fit.powers),
         structure_left=pooled_overidentification(chosen.fit, held_out),
         causes=causes,
-        doubted=doubted,
+        rejected=rejected,
         ranking=_ranking(base, stages[0]),
         first_stage=tuple(stages[0]),
         held_out=tuple(held_out),
@@ -188,11 +188,11 @@ def _selected_again(
     """A selection after the search went on from the causes that were kept; the first one where that predicts no better.
 
     Doubted causes are left out. Without any cause that is kept, every candidate has been tried alone. Where none was
-    doubted, only what has been fitted beside the causes that were kept is tried again, which costs little.
+    rejected, only what has been fitted beside the causes that were kept is tried again, which costs little.
     """
-    chosen, _, doubted = first
-    if doubted:
-        left_out = {cause.candidate.label for cause in doubted}
+    chosen, _, rejected = first
+    if rejected:
+        left_out = {cause.candidate.label for cause in rejected}
         rest = [each for each in candidates if each.label not in left_out]
     else:
         kept = frozenset(each.label for each in chosen.fit.candidates)
@@ -200,7 +200,7 @@ def _selected_again(
     larger, more = _forward(fitter, base, chosen, rest, lambda share, text: None)
     if larger is chosen:
         return first
-    again = select_causes(fitter, base, larger, [*stages, *more], always, doubted)
+    again = select_causes(fitter, base, larger, [*stages, *more], always, rejected)
     return again if predicts_better(Comparison(base, chosen, again[0]).probability) else first
 
 

@@ -1,8 +1,9 @@
 """Which causes are kept, as pure functions of tables of scores.
 
-A cause with a probability below 0.5 is replaced by a likelier alternative, or dropped and listed as doubted. A cause
-beside which an alternative has the larger share of the probability is challenged once: the alternative takes its place
-where it is accepted and probable itself. ``selection.causes`` measures the tables and fits what the decisions ask for.
+A cause with a probability below 0.5 is replaced by a likelier alternative, or dropped and listed as rejected
+(``doubted`` in gap.json). A cause beside which an alternative has the larger share of the probability is challenged
+once: the alternative takes its place where it is accepted and probable itself. ``selection.causes`` measures the tables
+and fits what the decisions ask for.
 """
 
 from __future__ import annotations
@@ -61,17 +62,6 @@ class SuccessorScores(Protocol):
     @property
     def probability(self) -> float:
         """Its calibrated probability in the cause's place."""
-
-
-@dataclass(frozen=True)
-class SuccessorTable:
-    """The scores of one possible successor as plain values."""
-
-    label: str
-    share: float
-    score: float
-    comparison: ComparisonScores
-    probability: float
 
 
 def next_challenge(

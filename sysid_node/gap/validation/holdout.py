@@ -169,7 +169,7 @@ def standing_explanation(attribution: Attribution, validator: Validator) -> tupl
 
 def _stands(attribution: Attribution, checked: Check) -> bool:
     attitude = tuple(checked.attitude.values())
-    return causes_stand(checked.gaps, attitude, excused=not attribution.is_favoured_by_derivatives)
+    return causes_stand(checked.gaps, attitude, derivatives_plausible=not attribution.is_favoured_by_derivatives)
 
 
 def _without_needless_causes(

@@ -59,7 +59,7 @@ def causes_stand(
     errors: Sequence[Errors],
     attitude: Sequence[Errors] = (),
     *,
-    excused: bool = True,
+    derivatives_plausible: bool = True,
     thresholds: Thresholds = THRESHOLDS,
 ) -> bool:
     """Whether causes predict better than the derivatives by at least one measure, and than the file by every one.
@@ -70,10 +70,10 @@ def causes_stand(
     attitude by the gyroscopes, in which no gusts are. Where they take away much of the error of short flights, they may
     be worse by the other measure by as much as still halves the product of both errors, as fitted derivatives may.
 
-    Derivatives that no tolerances together have ``excused`` may predict a little better than a cause that makes them
-    plausible again.
+    Derivatives that are implausible by their tolerances together (``derivatives_plausible`` is False) may predict a
+    little better than a cause that makes them plausible again.
     """
-    most = 1.0 if excused else thresholds.validation.unexcused
+    most = 1.0 if derivatives_plausible else thresholds.validation.implausible_derivatives
     limits = thresholds.validation
     seen = (*errors, *attitude)
     over_file = any(channel_ratio(e, e, "before", thresholds) < limits.large_improvement for e in errors)

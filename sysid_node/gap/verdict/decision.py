@@ -35,7 +35,7 @@ class CauseScores:
 
 
 @dataclass(frozen=True)
-class DoubtedScores:
+class RejectedCauseScores:
     """One effect that predicts better, but was not kept as a cause."""
 
     label: str
@@ -62,7 +62,7 @@ class VerdictScores:
     weather_suffices: bool  # weather and the sensors' noise account for the simulator's error in every reading
     externally_excited: bool  # the commands of at least one flight are more than the autopilot's response to gusts
     causes: tuple[CauseScores, ...]
-    doubted: tuple[DoubtedScores, ...]
+    rejected: tuple[RejectedCauseScores, ...]
     score_before: float  # log predictive score of the derivatives within their tolerances, nats
     score_after: float  # the same with the causes
     motion: Array  # power of what was measured, about the windows' means
@@ -78,11 +78,11 @@ class VerdictScores:
 
 @dataclass(frozen=True)
 class Decision:
-    """The verdict, the labels of the causes and of the doubted effects, and the rule that gave the verdict."""
+    """The verdict, the labels of the causes and of the rejected effects, and the rule that gave the verdict."""
 
     verdict: str
     causes: tuple[str, ...]
-    doubted: tuple[str, ...]
+    rejected: tuple[str, ...]
     reason: str
 
 
@@ -90,7 +90,7 @@ def decide(scores: VerdictScores, thresholds: Thresholds = THRESHOLDS) -> Decisi
     """The verdict: one of ``no_gap``, ``explained``, ``ambiguous``, ``unknown_effect``, ``unsupported``."""
     verdict, reason = next(_rules(scores, thresholds))
     causes = tuple(cause.label for cause in scores.causes)
-    return Decision(verdict, causes, tuple(cause.label for cause in scores.doubted), reason)
+    return Decision(verdict, causes, tuple(cause.label for cause in scores.rejected), reason)
 
 
 def _rules(scores: VerdictScores, thresholds: Thresholds) -> Iterator[tuple[str, str]]:
@@ -151,7 +151,7 @@ def is_misspecified(scores: VerdictScores) -> bool:
 
     Then something is there that resembles the effect, but is not the effect.
     """
-    return any(cause.supported_but_misspecified and not cause.replaced for cause in scores.doubted)
+    return any(cause.supported_but_misspecified and not cause.replaced for cause in scores.rejected)
 
 
 def error_needs_cause(simulation: SimulationScores | None, thresholds: Thresholds = THRESHOLDS) -> bool:

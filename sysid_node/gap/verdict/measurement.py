@@ -20,7 +20,7 @@ from sysid_node.gap.selection.comparison import power_left
 from sysid_node.gap.selection.forward_selection import Attribution
 from sysid_node.gap.validation.holdout import Check
 from sysid_node.gap.validation.spectral_error import Gap
-from sysid_node.gap.verdict.decision import CauseScores, DoubtedScores, SimulationScores, VerdictScores
+from sysid_node.gap.verdict.decision import CauseScores, RejectedCauseScores, SimulationScores, VerdictScores
 
 
 def measure(models: Sequence[ResidualModel], attribution: Attribution, check: Check) -> VerdictScores:
@@ -34,9 +34,9 @@ def measure(models: Sequence[ResidualModel], attribution: Attribution, check: Ch
         weather_suffices=check.weather_suffices,
         externally_excited=any(externally_excited(model) for model in models),
         causes=tuple(CauseScores(c.candidate.label, c.share, c.power_removed) for c in attribution.causes),
-        doubted=tuple(
-            DoubtedScores(c.candidate.label, is_supported_but_misspecified(c.evidence), c.replaced)
-            for c in attribution.doubted
+        rejected=tuple(
+            RejectedCauseScores(c.candidate.label, is_supported_but_misspecified(c.evidence), c.replaced)
+            for c in attribution.rejected
         ),
         score_before=check.base.total,
         score_after=check.final.total,

@@ -190,7 +190,7 @@ def _separation(
     instead[entries] = neutral[entries]
     added = [i for i in alternative.indices if i not in fit.indices]
     instead[added] = alternative.flights[0].point[added]
-    weight = weights(model.windows, np.where(model.axes, model.noise, 1.0))
+    weight = weights(np.where(model.axes, model.noise, 1.0))
     response = real_rows(model.predicted(point) - model.predicted(instead), weight).ravel()
     free = [*added, *(i for i in fit.nuisances.indices if i not in entries)]
     slopes = real_rows(model.slopes(instead, free), weight).reshape(response.size, -1)

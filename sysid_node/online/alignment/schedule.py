@@ -15,10 +15,6 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from sysid_node.flight.record import Array
-
 SPARE = 0.25  # IMU intervals that a fresh sample may wait longer than those of late
 RUNS = 8  # runs of ever shorter waits, each ended by a message, in which is looked for what is fresh
 
@@ -52,11 +48,3 @@ def due(schedule: Schedule, time: float, wait: float) -> bool:
     while reach >= schedule.next / rate:
         schedule.next += 1
     return True
-
-
-def due_times(time: Array, wait: Array, rate: float) -> Array:
-    """Those of the samples' times (N,) s, increasing, at which an estimate falls due."""
-    schedule = Schedule(rate)
-    found = [due(schedule, t, w) for t, w in zip(time.tolist(), wait.tolist(), strict=True)]
-    chosen: Array = time[np.array(found, dtype=bool)]
-    return chosen

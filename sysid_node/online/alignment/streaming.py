@@ -54,7 +54,7 @@ class _Clock:
     """The stamps of one topic."""
 
     last: int | None = None
-    leapt_to: int | None = None
+    jumped_to: int | None = None
     epoch: int = 0  # how often the clock was set
 
     def fault(self, stamp: int) -> str | None:
@@ -63,15 +63,15 @@ class _Clock:
             return UNSTAMPED if stamp <= 0 else BEYOND
         step = 1 if self.last is None else stamp - self.last
         if 0 < step <= STEP_FORWARD_NS:
-            self.last, self.leapt_to = stamp, None
+            self.last, self.jumped_to = stamp, None
             return None
         if -STEP_BACK_NS <= step <= 0:
             return OUT_OF_ORDER if step else DUPLICATE
-        if self.leapt_to is not None and 0 < stamp - self.leapt_to <= FOLLOWS_NS:
-            self.last, self.leapt_to = stamp, None
+        if self.jumped_to is not None and 0 < stamp - self.jumped_to <= FOLLOWS_NS:
+            self.last, self.jumped_to = stamp, None
             self.epoch += 1
             return None
-        self.leapt_to = stamp
+        self.jumped_to = stamp
         return CLOCK_STEP
 
 

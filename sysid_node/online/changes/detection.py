@@ -4,8 +4,8 @@ The transforms of the last seconds are kept in pieces. Each time a piece is comp
 end in it are tested against the estimates from before them (``score_test``): the generalised likelihood ratio over
 the time of change (Basseville & Nikiforov, "Detection of Abrupt Changes", 1993, sec. 7.2).
 
-Two levels of significance apply. Estimates that the last seconds contradict at the level ``DOUBT`` are not valid. At
-the level ``FALSE_ALARM`` the estimator forgets all data from before the time of change. It reports a change of the
+Two levels of significance apply. Estimates that the last seconds contradict at the level ``SIGNIFICANCE`` are invalid.
+At the level ``FALSE_ALARM`` the estimator forgets all data from before the time of change. It reports a change of the
 aircraft if the last seconds contradict earlier manoeuvres at that level, too (``excited_segments``); otherwise the
 earlier estimates were biased. Where no derivatives explain the residuals, the model itself does not hold, for example
 near the stall.
@@ -39,9 +39,9 @@ LONG = 12  # pieces from which on a stretch's lines can be corrected: both ends 
 EVERY = 3  # a span of n times so many pieces is looked at with every n-th piece
 FALSE_ALARM = 1e-9  # a test: an hour has 7200 pieces, times six coefficients and about two spans
 MARGIN = 1.5  # and F must exceed what chance allows by this factor: no model is exact
-#: Chance under which a test casts doubt. A coefficient's tests, of the spans and by well-excited flight, share one in a
-#: hundred (Bonferroni), so that all of them together cast doubt by chance no more often.
-DOUBT = 1e-2 / (len(SPANS) + 1)
+#: Level of significance at which a test makes an estimate invalid. The tests of a coefficient, of the spans and by
+#: well-excited flight, share one in a hundred (Bonferroni), so that all of them together do so by chance no more often.
+SIGNIFICANCE = 1e-2 / (len(SPANS) + 1)
 KNOWN = 12.0  # degrees of freedom that the earlier estimates must rest on
 LOST = 0.25  # share of the motion's energy left unexplained beyond which the model does not hold
 NOISE_RATIO = 9.0  # and by how much the residual must stand above its usual density
@@ -184,7 +184,7 @@ def examine(tests: ChangeTests, excited_segments: list[ExcitedSegments]) -> Chan
     for span, found in tests.contradictions(_due(change_monitor.examinations)):
         known = found.freedom >= KNOWN
         typical_statistic = _typical_statistic(change_monitor, span, C)
-        change_monitor.contradicted[span] = known & (found.chance(typical_statistic) < DOUBT)
+        change_monitor.contradicted[span] = known & (found.chance(typical_statistic) < SIGNIFICANCE)
         surest = min(surest, float(np.where(known, found.chance(MARGIN * typical_statistic), 1.0).min()))
         if span == USUAL:
             change_monitor.outside_model = known & (found.share > LOST) & (found.unexplained > NOISE_RATIO)
@@ -246,4 +246,4 @@ def compare(
         if reference is not None:
             alike = reference.equations.instrumented | ~published.equations.instrumented
             firm = alike & (full.structure.block == block) & (reference.uncertainty.freedom >= KNOWN)
-            change_monitor.contradicted_by_excited |= firm & (disagreement(reference, published) < DOUBT)
+            change_monitor.contradicted_by_excited |= firm & (disagreement(reference, published) < SIGNIFICANCE)

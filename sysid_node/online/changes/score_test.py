@@ -189,15 +189,15 @@ def _unexplained(equations: NormalEquations, reference: ReferenceEstimates, norm
     ``normal`` (..., P, P): Gram matrix of the regressors.
     """
     structure = equations.structure
-    misfit: Array = left_over.take(equations.outputs, axis=-2).diagonal(axis1=-2, axis2=-1).copy()
+    unexplained: Array = left_over.take(equations.outputs, axis=-2).diagonal(axis1=-2, axis2=-1).copy()
     score = left_over.take(equations.columns, axis=-2) * structure.belongs
     normal = normal * structure.same_block
     normal += structure.unit * (RIDGE * normal.diagonal(axis1=-2, axis2=-1) + TINY)[..., None, :]
     solved = np.empty_like(score)
     for one, right, found in zip(_each(normal), _each(score), _each(solved), strict=True):
         found[:] = dposv(one, right)[1]
-    misfit -= (score * (reference.solution.theta + solved)).sum(axis=-2)
-    return misfit
+    unexplained -= (score * (reference.solution.theta + solved)).sum(axis=-2)
+    return unexplained
 
 
 def _each(matrices: Array) -> Array:

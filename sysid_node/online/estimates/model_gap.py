@@ -35,7 +35,7 @@ def model_gap(state: EstimatorState, current: CurrentSolution | None) -> list[Co
     start, _, stop = state.model.settings.frequencies
     per_energy = 2.0 * (stop - start) / max(float(latest.total.traces.sum()), 1e-12)
     gram, theta = current.gram, current.solution.theta
-    v = least_squares.misfits(equations, values)
+    v = least_squares.residual_combinations(equations, values)
     energy = np.maximum(((gram @ v) * v).sum(axis=0), 0.0)
     motion = current.solution.motion
     relative = np.sqrt(np.divide(energy, motion, out=np.full_like(motion, np.nan), where=motion > 0.0))

@@ -50,13 +50,13 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
     cautions = np.where(table.offset, factors.max(axis=0)[c], factors[table.unknown, c])
     caution, longest = np.maximum(cautions, 1.0), latest.instruments.anderson_rubin.longest(squares)
     systematic = _systematic(state, latest)
-    unobjected = objections == status.OK
+    without_objection = objections == status.OK
     stds, samples = np.sqrt(2.0 * (stop - start) * latest.uncertainty.density), round(latest.total.samples)
     return ValidityBasis(
-        unobjected=(strength >= normal_equations.STRONG)[c] & unobjected,
+        without_objection=(strength >= normal_equations.STRONG)[c] & without_objection,
         objections=objections,
-        reasons=np.where(unobjected, np.uint8(status.CONVERGING), objections),
-        open=unobjected,
+        reasons=np.where(without_objection, np.uint8(status.CONVERGING), objections),
+        open=without_objection,
         squares=squares,
         longest=longest,
         # what is allowed is counted with the systematic part, which no caution about chance concerns
@@ -102,7 +102,7 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     objections = np.zeros(c.size, np.uint8)
     lag = latest.tests.lag
     biased = lag.biased[table.unknown, c] & ~table.offset
-    objections[biased] = [words.code(f"{lag.blamed_control[i]} not on time") for i in c[biased].tolist()]
+    objections[biased] = [words.code(f"{lag.lagging_control[i]} not on time") for i in c[biased].tolist()]
     solved = state.equations.structure
     for symbol in _ahead_of_commands(state, latest):
         of_it = solved.belongs[np.array(solved.regressors) == symbol].any(axis=0)
@@ -133,16 +133,16 @@ def judge(state: EstimatorState, latest: SegmentSolution, current: CurrentSoluti
     table, equations, basis = state.model.table, state.equations, validity_basis(state, latest)
     motion = current.gram.reshape(-1).take(equations.entries.energy)
     inflation = current.size * motion
-    buried = motion < basis.floor
-    hidden = buried | (inflation > INDISTINGUISHABLE)
+    below_noise = motion < basis.floor
+    unidentifiable = below_noise | (inflation > INDISTINGUISHABLE)
     poor = _poor(current)
-    good = _narrow(basis, current) & basis.unobjected
-    if np.count_nonzero(hidden):
-        good &= ~(hidden.take(table.unknown) & table.slope) & ~_with_hidden_slope(state, hidden)
+    good = _narrow(basis, current) & basis.without_objection
+    if np.count_nonzero(unidentifiable):
+        good &= ~(unidentifiable.take(table.unknown) & table.slope) & ~_with_unidentifiable_slope(state, unidentifiable)
     if np.count_nonzero(poor):
         good &= ~poor.take(table.coefficient)
     bad = ~good
-    codes: Codes = bad * _reasons(state, basis, current, bad, inflation, buried, poor)
+    codes: Codes = bad * _reasons(state, basis, current, bad, inflation, below_noise, poor)
     if state.inputs.force.fault:
         codes[:] = status.OUTSIDE
     _withhold_unchanging(state, codes)
@@ -180,10 +180,12 @@ def _poor(current: CurrentSolution) -> Flags:
     return poor
 
 
-def _with_hidden_slope(state: EstimatorState, hidden: Flags) -> Flags:
-    """(D,) offsets that hold what a hidden slope (P,) of their coefficient does."""
+def _with_unidentifiable_slope(state: EstimatorState, unidentifiable: Flags) -> Flags:
+    """(D,) offsets that hold what an unidentifiable slope (P,) of their coefficient does."""
     table = state.model.table
-    return np.asarray(((hidden @ state.equations.structure.belongs) > 0.0).take(table.coefficient) & table.offset)
+    return np.asarray(
+        ((unidentifiable @ state.equations.structure.belongs) > 0.0).take(table.coefficient) & table.offset
+    )
 
 
 def _reasons(
@@ -192,12 +194,12 @@ def _reasons(
     current: CurrentSolution,
     bad: Flags,
     inflation: Array,
-    buried: Flags,
+    below_noise: Flags,
     poor: Flags,
 ) -> Codes:
     """(D,) what speaks against those that are ``bad`` (D,).
 
-    ``inflation`` (P,) of its unknown's variance, a regressor ``buried`` (P,) in noise, a ``poor`` (C,) fit.
+    ``inflation`` (P,) of its unknown's variance, a regressor's motion ``below_noise`` (P,), a ``poor`` (C,) fit.
     """
     if not current.solution.usable:
         return np.full_like(basis.reasons, status.NOT_EXCITED)
@@ -210,9 +212,9 @@ def _reasons(
         reasons[poor.take(table.coefficient) & asked] = status.OUTSIDE
     collinear = (inflation.take(table.unknown) > COLLINEAR) & slopes
     if np.count_nonzero(collinear):
-        rivals = least_squares.most_correlated(state.equations, current.solution).take(table.unknown)
-        reasons[collinear] = state.model.vocabulary.collinear + rivals[collinear]
-    if np.count_nonzero(buried):
-        of_slope = buried.take(table.unknown) & slopes
-        reasons[of_slope | (_with_hidden_slope(state, buried) & asked)] = status.NOT_EXCITED
+        partners = least_squares.most_correlated(state.equations, current.solution).take(table.unknown)
+        reasons[collinear] = state.model.vocabulary.collinear + partners[collinear]
+    if np.count_nonzero(below_noise):
+        of_slope = below_noise.take(table.unknown) & slopes
+        reasons[of_slope | (_with_unidentifiable_slope(state, below_noise) & asked)] = status.NOT_EXCITED
     return reasons

@@ -40,7 +40,7 @@ class LagTest(NamedTuple):
 
     lags: tuple[Lag, ...]
     biased: NDArray[np.bool_]  # (P, C)
-    blamed_control: dict[int, str]  # coefficient -> control
+    lagging_control: dict[int, str]  # coefficient -> control
 
 
 def examine(
@@ -57,7 +57,7 @@ def examine(
     """
     structure = equations.structure
     biased = np.zeros(structure.belongs.shape, dtype=bool)
-    blamed_control: dict[int, str] = {}
+    lagging_control: dict[int, str] = {}
     best: dict[str, Lag] = {}
     for c in np.flatnonzero(spread.density > 0.0).tolist():
         unknowns = structure.unknowns(c)
@@ -78,8 +78,8 @@ def examine(
             bad = (moved > SHIFT_STANDARD_ERRORS * errors) & (moved > NEGLIGIBLE_SHARE * size)
             if abs(lag.delay) > SIGNIFICANT * lag.standard_error and bad.any():
                 biased[unknowns[bad], c] = True
-                blamed_control[c] = symbol
-    return LagTest(tuple(best.values()), biased, blamed_control)
+                lagging_control[c] = symbol
+    return LagTest(tuple(best.values()), biased, lagging_control)
 
 
 def _with_rate(

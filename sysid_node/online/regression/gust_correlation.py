@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.online.regression.heteroskedasticity import DOUBT, NoiseMoments
-from sysid_node.online.regression.least_squares import Solution, Uncertainty, misfits
+from sysid_node.online.regression.heteroskedasticity import EXCESS_RATIO, NoiseMoments
+from sysid_node.online.regression.least_squares import Solution, Uncertainty, residual_combinations
 from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ TELLING |= dict.fromkeys(("CY", "Cl", "Cn"), ("CY", "Cl", "Cn"))
 
 def share_of_gusts(density: Array, sensed: Array) -> Array:
     """(..., C) share of a residual's ``density`` that is not the sensors' noise, which has the density ``sensed``."""
-    return np.asarray(np.clip(1.0 - DOUBT * sensed / np.maximum(density, 1e-300), 0.0, 1.0))
+    return np.asarray(np.clip(1.0 - EXCESS_RATIO * sensed / np.maximum(density, 1e-300), 0.0, 1.0))
 
 
 def share_by_axis(coefficients: Sequence[str], gusts: Array) -> Array:
@@ -92,7 +92,7 @@ def sensed(
     ``bias`` (W, W): noise of the regressors, per line and second (``regressor_noise.gram_bias``); ``step`` (s): IMU
     interval; ``omega`` (F,) rad/s: the lines, over which a rate's derivative has the noise of the rate times omega.
     """
-    v = misfits(equations, solution.theta)
+    v = residual_combinations(equations, solution.theta)
     density: Array = ((bias @ v) * v).sum(axis=0)
     if noise_moments.duration > 0.0:
         density = density + (noise_moments.power + noise_moments.alpha_power) / noise_moments.duration

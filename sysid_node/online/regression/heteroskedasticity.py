@@ -22,7 +22,7 @@ from sysid_node.online.frequency.regression_signals import OFFSET, SignalLayout
 from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
-DOUBT = 1.5  # times the sensors' noise that a residual holds before it is more than that
+EXCESS_RATIO = 1.5  # times the sensors' noise that a residual holds before it is more than that
 RIDGE, TINY = 1e-9, 1e-100  # set regressors apart that moved alike, or not at all
 
 
@@ -105,7 +105,7 @@ def heteroskedastic_excess(
     if noise_moments.duration <= 0.0:
         return 0.0
     moments = noise_moments.moments * same_block
-    other = density * noise_moments.duration - DOUBT * (noise_moments.power + noise_moments.accelerometer_power)
+    other = density * noise_moments.duration - EXCESS_RATIO * (noise_moments.power + noise_moments.accelerometer_power)
     more = np.maximum(other / np.maximum(noise_moments.alpha_power, TINY), 1.0)
     weighted = noise_moments.weighted + more[:, None, None] * noise_moments.alpha_weighted
     mean = (noise_moments.power + more * noise_moments.alpha_power) / noise_moments.duration

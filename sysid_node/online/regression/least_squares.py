@@ -52,10 +52,10 @@ def solve(equations: NormalEquations, gram: Array, bias: Array | None = None) ->
     solved, usable = _factorised(equations, cross)
     theta = solved[:, P:]
     # |y - A theta|^2 = y'y + theta' (A'A theta - 2 A'y), with the noise in it
-    misfit = theta.T.dot(normal[:P])
-    misfit -= normal[P:]
+    bracket = theta.T.dot(normal[:P])
+    bracket -= normal[P:]
     motion = flat.take(equations.entries.square)
-    residual: Array = np.maximum(misfit.dot(theta).diagonal() + motion, ROUNDING * motion)
+    residual: Array = np.maximum(bracket.dot(theta).diagonal() + motion, ROUNDING * motion)
     return Solution(theta, solved[:, :P], residual, motion, usable)
 
 
@@ -88,7 +88,7 @@ def bias_of(equations: NormalEquations, bias: Array) -> Array:
     return np.asarray(bias.take(equations.entries.normal[1]) * equations.entries.counted[1])
 
 
-def misfits(equations: NormalEquations, theta: Array) -> Array:
+def residual_combinations(equations: NormalEquations, theta: Array) -> Array:
     """(W, C) the combinations of signals y - sum theta_j x_j that ``theta`` (P, C) leaves of each coefficient."""
     C = equations.outputs.size
     v = np.zeros((equations.width, C))
@@ -113,7 +113,7 @@ def uncertainty(equations: NormalEquations, solution: Solution, info: Informatio
     C, P = len(structure.coefficients), equations.columns.size
     if not solution.usable or info.trace_square <= 0.0:
         return Uncertainty(np.zeros((C, P, P)), np.zeros(C), np.zeros((C, BANDS)), np.zeros(C))
-    v = misfits(equations, solution.theta)
+    v = residual_combinations(equations, solution.theta)
     least = ROUNDING * info.grams[:, equations.outputs, equations.outputs]
     squares = np.maximum(((info.grams @ v) * v).sum(axis=1), least).T  # (C, B)
     scores = info.scores[:, equations.instruments[:, None], equations.instruments] * structure.same_block
@@ -183,5 +183,5 @@ def most_correlated(equations: NormalEquations, solution: Solution) -> Index:
     # each row's own spread is common to all of it
     correlation = np.abs(solution.inverse) / np.maximum(spread, 1e-150)
     correlation *= structure.others.T  # it is symmetric, and lies as LAPACK's inverse does
-    rival: Index = correlation.argmax(axis=-1)
-    return rival
+    partner: Index = correlation.argmax(axis=-1)
+    return partner

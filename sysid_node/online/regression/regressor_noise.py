@@ -27,7 +27,7 @@ from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 _LIFT, _DRAG = COEFFICIENTS.index("CL"), COEFFICIENTS.index("CD")
-DOUBT = 1.5  # a residual's density is itself uncertain: only beyond this does it contradict the aircraft file
+LARGEST_RATIO = 1.5  # a residual's density is itself uncertain: only beyond this does it contradict the aircraft file
 
 
 def gram_bias(aircraft: Aircraft, layout: SignalLayout, mean: Array, step: float, air_interval: float) -> Array:
@@ -62,10 +62,10 @@ def allowed(equations: NormalEquations, solution: Solution, density: Array, bias
     ``bias`` (W, W) is per line and second. The residual of a coefficient holds v' bias v of the noise, v = (1, -theta);
     where that is more than the whole residual, the file's noise is too large, and the excess is not subtracted.
     """
-    v = least_squares.misfits(equations, solution.theta)
+    v = least_squares.residual_combinations(equations, solution.theta)
     noise = ((bias @ v) * v).sum(axis=0)
     share = np.ones(equations.width)
-    for c in np.flatnonzero(noise > DOUBT * density).tolist():
+    for c in np.flatnonzero(noise > LARGEST_RATIO * density).tolist():
         members = np.flatnonzero(v[:, c])
         share[members] = np.minimum(share[members], density[c] / noise[c])
     return np.sqrt(share)
@@ -73,5 +73,5 @@ def allowed(equations: NormalEquations, solution: Solution, density: Array, bias
 
 def noise_score(equations: NormalEquations, solution: Solution, bias: Array) -> Array:
     """(P, C) what the noise alone makes of Z'r, Z the instruments and r the residuals, of its ``bias`` (W, W)."""
-    left = (bias @ least_squares.misfits(equations, solution.theta)).take(equations.instruments, axis=0)
+    left = (bias @ least_squares.residual_combinations(equations, solution.theta)).take(equations.instruments, axis=0)
     return np.asarray(left * equations.structure.belongs)

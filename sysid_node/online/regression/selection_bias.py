@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.regression.least_squares import InstrumentStrength, Solution, Uncertainty, misfits
+from sysid_node.online.regression.least_squares import InstrumentStrength, Solution, Uncertainty, residual_combinations
 from sysid_node.online.regression.mixed_estimation import weighed
 from sysid_node.online.regression.normal_equations import NormalEquations
 
@@ -38,7 +38,7 @@ def selection_bias_factors(
     if equations.least_squares or not solution.usable:
         return np.ones_like(equations.structure.belongs)
     meeting, _ = weighed(equations.structure, solution.theta, spread.covariance, values, precisions)
-    v = misfits(equations, meeting)
+    v = residual_combinations(equations, meeting)
     squares = ((gram @ v) * v).sum(axis=0)
     more = np.where(equations.instrumented, np.maximum(squares / np.maximum(solution.residual, 1e-300), 1.0), 1.0)
     factor = np.where(equations.instrumented, instrument_strength.selection_factor[:, None], 1.0) * more

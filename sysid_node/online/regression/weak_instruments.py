@@ -21,7 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.online.regression.derivative_index import DerivativeIndex
-from sysid_node.online.regression.least_squares import ROUNDING, TINY, Solution, Uncertainty, misfits, student_95
+from sysid_node.online.regression.least_squares import (
+    ROUNDING,
+    TINY,
+    Solution,
+    Uncertainty,
+    residual_combinations,
+    student_95,
+)
 from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
@@ -55,7 +62,7 @@ def anderson_rubin_bounds(
     ``noise`` (C, P, P): the part of the ``spread``'s covariance that comes from the residual; the rest does not bend.
     """
     covariance, P = spread.covariance, equations.columns.size
-    v = misfits(equations, solution.theta)
+    v = residual_combinations(equations, solution.theta)
     gradient = (gram[equations.columns] @ v).T * equations.structure.belongs.T  # (C, P)
     normal = gram[equations.columns[:, None], equations.columns] * equations.structure.same_block
     in_offset = covariance @ mean

@@ -100,7 +100,7 @@ def _with_corrected(
     correction = LineCorrection(
         imperfect, signals.changes, servos, signals.estimate, considered.covariance, considered.jacobian[:, :, :-1]
     )
-    inflation = None if corrected.inflation is None else corrected.inflation * considered.misfit
+    inflation = None if corrected.inflation is None else corrected.inflation * considered.overdispersion
     return replace(recorded, corrected=replace(corrected, correction=correction, inflation=inflation))
 
 
@@ -118,7 +118,7 @@ def _variance_factors(found: SolvedEquations, recorded: Solution, systematic: Sy
     """(C, P) variances over those that the ``recorded`` signals' solution has by its residual alone."""
     variance = found.inflation[:, None] * found.spread.covariance.diagonal(axis1=1, axis2=2)
     if systematic is not None:
-        variance = variance * systematic.considered.misfit[:, None]
+        variance = variance * systematic.considered.overdispersion[:, None]
     scale = recorded.residual[:, None] * np.abs(recorded.inverse.diagonal())
     return np.divide(variance, scale, out=np.zeros_like(scale), where=scale > 0.0)
 
@@ -201,7 +201,7 @@ def _systematic(
         signals,
         state.finished.pieces,
         1.0 if share is None else share,
-        tuple(state.search.rivals.values()),
+        tuple(state.search.alternatives.values()),
     )
     return found
 

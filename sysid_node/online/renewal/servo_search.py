@@ -27,7 +27,7 @@ from sysid_node.online.renewal.segment_information import measure_segment
 from sysid_node.online.state import ChangeWatch, EstimatorState, Steps, current_lines
 from sysid_node.online.systematic import estimation
 from sysid_node.online.systematic.consider import Fit
-from sysid_node.online.systematic.estimation import Rival, SystematicErrors
+from sysid_node.online.systematic.estimation import AlternativeSolution, SystematicErrors
 from sysid_node.online.systematic.imperfections import CURVATURE
 
 FIRST, GROWTH = 8.0, 1.3  # s of data with which the first other solution is tried, and by what they grow to the next
@@ -53,7 +53,7 @@ def try_another_solution(state: EstimatorState) -> Steps[None]:
         return
     control = int(imperfect.unknown[search.tried % imperfect.unknown.size])
     search.energy, search.tried = energy, search.tried + 1
-    search.rivals.pop(control, None)
+    search.alternatives.pop(control, None)
     trial = yield from _elsewhere(state, found, control)
     other = segment_solution.last_errors(trial) if trial is not None else None
     if trial is None or other is None or not _apart(other, found, int(imperfect.timed[control]), control):
@@ -66,7 +66,7 @@ def try_another_solution(state: EstimatorState) -> Steps[None]:
         other, less = found, -less
     probability = 1.0 / (1.0 + math.exp(min(-0.5 * min(less, 0.0), 100.0)))
     if probability > NEGLIGIBLE:
-        search.rivals[control] = Rival.of(imperfect, other, probability)
+        search.alternatives[control] = AlternativeSolution.of(imperfect, other, probability)
 
 
 def _elsewhere(state: EstimatorState, found: SystematicErrors, control: int) -> Steps[EstimatorState | None]:

@@ -38,7 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from sysid_node.online.regression.least_squares import RIDGE, TINY, Solution, misfits
+from sysid_node.online.regression.least_squares import RIDGE, TINY, Solution, residual_combinations
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.systematic.column_changes import ColumnChanges
 from sysid_node.online.systematic.corrected_signals import CorrectedSignals
@@ -58,7 +58,7 @@ class Fit:
     """How well C equations with the corrected signals fit."""
 
     explained: Array  # (C,) energy of the residuals that the exogenous signals explain
-    noise: Array  # (C,) that energy per exogenous signal if the residuals were noise; misfit included
+    noise: Array  # (C,) that energy per exogenous signal if the residuals were noise; overdispersion included
     improbable: float  # sum of the imperfections' squares about their expectations, in tolerances
 
     def cost(self, weights: Fit) -> float:
@@ -75,7 +75,8 @@ class Considered:
     step: Array  # (K,) by which it is beyond what the signals were corrected for
     covariance: Array  # (K, K)
     jacobian: Array  # (K, C, P + 1)
-    misfit: Array  # (C,) how many times as much of the residuals as of noise the exogenous signals explain, at least 1
+    #: (C,) how many times as much of the residuals as of noise the exogenous signals explain, at least 1
+    overdispersion: Array
     fit: Fit  # before the ``step``
 
     def shortened(self, share: float) -> Considered:
@@ -138,7 +139,7 @@ class _Findings(NamedTuple):
 
     imperfections: int  # K
     equations: list[EquationSums]
-    misfit: Array  # (C,) see ``Considered``
+    overdispersion: Array  # (C,) see ``Considered``
     explained: Array  # (C,) see ``Fit``
     moves: NDArray[np.bool_]  # (C,) coefficients that are more than rounding
 
@@ -184,8 +185,8 @@ def consider(
         sigmas * step,
         sigmas[:, None] * covariance * sigmas,
         jacobian / sigmas[:, None, None],
-        found.misfit,
-        Fit(found.explained, noise * found.misfit * found.moves, float(off @ beliefs.precision @ off)),
+        found.overdispersion,
+        Fit(found.explained, noise * found.overdispersion * found.moves, float(off @ beliefs.precision @ off)),
     )
 
 
@@ -200,7 +201,7 @@ def _sensitivities(
     """What the imperfections change of the slopes and the residuals, per tolerance."""
     structure, gram, changes = equations.structure, signals.gram, signals.changes
     v = np.zeros((changes.columns.width, len(structure.coefficients)))
-    v[place] = misfits(equations, solution.theta)
+    v[place] = residual_combinations(equations, solution.theta)
     X, V = signals.matrix[place[equations.columns]], signals.matrix[place[equations.instruments]]
     residuals = v.T @ signals.matrix  # (C, 2N)
     # (C, K, 2N), per tolerance; one product for each imperfection, as the changes need not be copied for it
@@ -238,7 +239,7 @@ def _findings(
     """
     structure, gram = equations.structure, signals.gram
     C = len(structure.coefficients)
-    equations_found, misfit, explained = list[EquationSums](), np.ones(C), np.zeros(C)
+    equations_found, overdispersion, explained = list[EquationSums](), np.ones(C), np.zeros(C)
     moves = gram.diagonal()[place[equations.outputs]] > STILL**2 * signals.information.energy
     for block in range(int(structure.block.max()) + 1):
         project = _projection(equations, signals.changes, place, gram, block, freed=freed)
@@ -247,10 +248,10 @@ def _findings(
             projected, whole = q.T @ q, residuals[c] @ gram @ residuals[c].T
             further = project.shape[0] - int(structure.belongs[:, c].sum())  # than the unknowns take
             explained[c] = projected[-1, -1]
-            misfit[c] = max(float(explained[c]) / (float(noise[c]) * max(further, 1)), 1.0)
-            weight = float(noise[c] * misfit[c])
+            overdispersion[c] = max(float(explained[c]) / (float(noise[c]) * max(further, 1)), 1.0)
+            weight = float(noise[c] * overdispersion[c])
             equations_found.append(EquationSums(projected, whole, further, float(freedom[c]), float(gusts[c]), weight))
-    return _Findings(residuals.shape[1] - 1, equations_found, misfit, explained, moves)
+    return _Findings(residuals.shape[1] - 1, equations_found, overdispersion, explained, moves)
 
 
 def _by_the_model(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sysid_node.online.frequency.fourier_transform import impulse
 from sysid_node.online.regression.information import clean_lines_and_rates, edges
 from sysid_node.online.regression.instruments import InstrumentModel
-from sysid_node.online.regression.least_squares import misfits
+from sysid_node.online.regression.least_squares import residual_combinations
 from sysid_node.online.regression.normal_equations import NormalEquations
 from sysid_node.online.systematic import servo_model
 from sysid_node.online.systematic.column_changes import ColumnChanges
@@ -65,7 +65,7 @@ class LineCorrection:
         matrix, place = corrected_by(self.changes, self.estimate), self.imperfect.places
         found = _stacked(both @ matrix[place].T)
         v = np.zeros((self.changes.columns.width, theta.shape[1]))
-        v[place] = misfits(equations, theta)
+        v[place] = residual_combinations(equations, theta)
         direct = (v.T @ self.changes.signals).swapaxes(0, 1)  # (C, K, 2N) of the residuals by each imperfection
         # imperfections that are others would have made the slopes others, too
         by_slopes = self.jacobian.swapaxes(0, 1) @ matrix[place[equations.columns]]

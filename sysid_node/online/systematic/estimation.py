@@ -35,14 +35,14 @@ EARLY = 10.0
 
 
 @dataclass(frozen=True)
-class Rival:
+class AlternativeSolution:
     """Another solution, which the data and what is believed hardly tell from the one that is taken."""
 
     imperfections: Array  # (K,) with the servos' lateness and curvature themselves
     probability: float  # of it, at most a half
 
     @classmethod
-    def of(cls, imperfect: Imperfections, found: SystematicErrors, probability: float) -> Rival:
+    def of(cls, imperfect: Imperfections, found: SystematicErrors, probability: float) -> AlternativeSolution:
         """What was ``found`` from there."""
         return cls(found.considered.estimate + _base(imperfect, found.lines), probability)
 
@@ -101,12 +101,12 @@ def systematic_errors(
     signals: CorrectedSignals,
     pieces: int,
     share: float,
-    rivals: tuple[Rival, ...],
+    alternatives: tuple[AlternativeSolution, ...],
 ) -> Generator[None, None, SystematicErrors]:
     """By the corrected ``signals`` and what is ``solved`` with them.
 
     The lines have the controls where the ``servos`` have them. At most a ``share`` of the step is made. The intervals
-    reach to the ``rivals``. It is made in steps (``state.Steps``).
+    reach to the ``alternatives``. It is made in steps (``state.Steps``).
     """
     equations, spread = solved.equations, solved.spread
     beliefs = Beliefs(*prior(imperfect, servos), imperfect.precision)
@@ -124,8 +124,8 @@ def systematic_errors(
     )
     share = min(share, LARGEST_STEP / max(float(np.abs(found.step[imperfect.servos]).max(initial=0.0)), LARGEST_STEP))
     found = found.shortened(share)
-    for rival in rivals:
-        found = found.widened(rival.imperfections - _base(imperfect, servos), rival.probability)
+    for alternative in alternatives:
+        found = found.widened(alternative.imperfections - _base(imperfect, servos), alternative.probability)
     published = with_steps(imperfect, found)
     return SystematicErrors(
         found,

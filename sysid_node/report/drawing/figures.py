@@ -110,10 +110,10 @@ def moment(time: float, colour: str = INK) -> dict[str, Any]:
     return {**position, "line": {"color": colour, "dash": "dot", "width": 1.2}}
 
 
-def stretch(begin: float, end: float, colour: str = GREY_BAND) -> dict[str, Any]:
+def stretch(begin: float, end: float) -> dict[str, Any]:
     """The background between two times (s)."""
     position = {"type": "rect", "yref": "paper", "y0": 0, "y1": 1, "x0": begin, "x1": end}
-    return {**position, "fillcolor": colour, "line": {"width": 0}, "layer": "below"}
+    return {**position, "fillcolor": GREY_BAND, "line": {"width": 0}, "layer": "below"}
 
 
 def axis(title: str, **more: Any) -> dict[str, Any]:

@@ -48,11 +48,11 @@ def thin_curve(time: Array, *curves: Array, points: int = MAX_POINTS) -> tuple[A
     return (time[rows], *(curve[rows] for curve in curves))
 
 
-def thin_flight(flight: FlightRecord, most: int = MAX_ROWS) -> FlightRecord:
-    """The record itself where it is short, else at most ``most`` of its samples: those with the columns' extremes."""
-    if len(flight) <= most:
+def thin_flight(flight: FlightRecord) -> FlightRecord:
+    """The record where it is short, else at most ``MAX_ROWS`` of its samples: those with the columns' extremes."""
+    if len(flight) <= MAX_ROWS:
         return flight
-    rows = _rows(tuple(flight.columns.values()), most)
+    rows = _rows(tuple(flight.columns.values()), MAX_ROWS)
     columns = {name: values[rows] for name, values in flight.columns.items()}
     return FlightRecord(flight.time[rows], columns, flight.name, flight.start_ns, flight.rejected)
 

@@ -52,7 +52,7 @@ def _weights(summary: FleetSummary) -> Table:
     rows: list[Row] = [
         (flight, *key, weight)
         for key, p in summary.populations.items()
-        for flight, weight in zip(p.series.flight, p.owed.tolist(), strict=True)
+        for flight, weight in zip(p.series.flight, p.fleet_weight.tolist(), strict=True)
     ]
     return ("flight", "aircraft", "derivative", "weight"), rows
 

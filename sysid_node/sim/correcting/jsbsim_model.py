@@ -56,7 +56,7 @@ def write_corrected(survey: ModelSurvey, before: Aircraft, after: Aircraft, fold
     prolog, root = read_document(files.main)
     parts = _Parts.of(files, prolog, root)
     left_out = _change_systems(parts, survey, before, after)
-    increments = increments_between(before, after, _properties(survey, before, root))
+    increments = increments_between(before, after, _properties(survey, root))
     _stall(parts, increments, before, after, left_out)
     add_increments(root, parts.aerodynamics, increments, survey.cg_in)
     parts.write()
@@ -174,11 +174,11 @@ def _change_systems(parts: _Parts, survey: ModelSurvey, before: Aircraft, after:
             parts.systems, surface, survey.chains[control], servo, ServoChange(wanted, damping, lost)
         ):
             left_out[f"servo of {control}"] = "no component of the model writes its position"
-    left_out |= change_throttle(parts.root, parts.systems, survey.engines, old, new)
+    left_out |= change_throttle(parts.systems, survey.engines, old, new)
     return left_out
 
 
-def _properties(survey: ModelSurvey, aircraft: Aircraft, root: Element) -> ModelProperties:
+def _properties(survey: ModelSurvey, root: Element) -> ModelProperties:
     surfaces = {s.name: (s.position, s.sign * s.unit) for s in survey.surfaces}
     external = root.find("external_reactions/force[@name='thrust']")
     thrust = "forces/fbx-prop-lbs" if survey.engines else None

@@ -12,9 +12,7 @@ from sysid_node.sim.importing.jsbsim.files import outputs_of
 Effects = Mapping[str, Mapping[str, float]]
 
 
-def change_throttle(
-    root: Element, systems: Sequence[Element], engines: int, old: Effects, new: Effects
-) -> dict[str, str]:
+def change_throttle(systems: Sequence[Element], engines: int, old: Effects, new: Effects) -> dict[str, str]:
     """Put the motor's lag and the throttle's delay into the model, in place; what could not be put in, and why."""
     lag = new.get("motor_lag", {}).get("time_constant", 0.0) - old.get("motor_lag", {}).get("time_constant", 0.0)
     delay = (new.get("command_delay", {}).get("throttle", 0.0)) - old.get("command_delay", {}).get("throttle", 0.0)

@@ -94,7 +94,7 @@ class LevelFlight:
 def aircraft_of(plant: Plant, airspeed: float | None) -> tuple[Aircraft, LevelFlight]:
     """The aircraft, ``ideal``, with its coefficients about level flight. Raises InputError where there is none."""
     level = _level_flight(plant, airspeed)
-    at = _states(plant, level)
+    at = _states(level)
     thrust = _engine(plant, at)[0]
     size = float(np.hypot(thrust[0], thrust[2]))
     throttle = None
@@ -140,7 +140,7 @@ def _engine(plant: Plant, states: PlantStates) -> Array:
     return np.zeros((len(states.airspeed), 6)) if plant.engine is None else plant.engine.loads(states)
 
 
-def _states(plant: Plant, level: LevelFlight) -> PlantStates:
+def _states(level: LevelFlight) -> PlantStates:
     one = np.ones(1)
     controls = {symbol: value * one for symbol, value in level.deflections.items()}
     still = 0.0 * one
@@ -207,7 +207,7 @@ def _balance(plant: Plant, speed: float) -> LevelFlight | None:
 
     def residual(z: Array) -> Array:
         level, theta = flight(z)
-        states = _states(plant, level)
+        states = _states(level)
         load = (plant.air(states) + _engine(plant, states))[0]
         cos = np.cos(theta)
         down = np.array([-np.sin(theta), np.sin(level.phi) * cos, np.cos(level.phi) * cos])

@@ -19,7 +19,7 @@ from sysid_node.gap.selection.acceptance import (
 )
 from sysid_node.gap.selection.calibration import CauseEvidence
 from sysid_node.gap.thresholds import THRESHOLDS
-from sysid_node.gap.verdict.decision import CauseScores, DoubtedScores, VerdictScores
+from sysid_node.gap.verdict.decision import CauseScores, RejectedCauseScores, VerdictScores
 
 NOTHING = RemainingPower(np.zeros(12), np.zeros(12))
 COMPARISON = ComparisonTable(
@@ -43,7 +43,7 @@ def known() -> RecordedDiagnosis:
     scores = VerdictScores(
         signal_to_noise=1000.0, weather_suffices=False, externally_excited=True,
         causes=(CauseScores("actuator_lag", 0.85, np.full(12, 0.5)),),
-        doubted=(DoubtedScores("imu_scale", supported_but_misspecified=True, replaced=True),),
+        rejected=(RejectedCauseScores("imu_scale", supported_but_misspecified=True, replaced=True),),
         score_before=-500.0, score_after=-400.0, motion=np.ones(12), power_before=np.full(12, 0.6),
         power_after=np.full(12, 0.01), structure_deviations=np.zeros(12), structure_share=np.zeros(12),
         sampling=np.zeros(12), simulation=None,
@@ -74,7 +74,7 @@ def test_a_stricter_acceptance_changes_the_search(known) -> None:
 
 
 def test_an_effect_that_is_no_longer_misspecified_would_be_kept(known) -> None:
-    lenient = replace(THRESHOLDS, calibration=replace(THRESHOLDS.calibration, misfit=0.4))
+    lenient = replace(THRESHOLDS, calibration=replace(THRESHOLDS.calibration, misspecification=0.4))
     assert changed([known], lenient) == ({}, 1)
 
 
@@ -88,7 +88,7 @@ def test_each_threshold_is_swept_alone() -> None:
 
 def test_the_page_lists_what_changes(known) -> None:
     text = page([known], [(LAG.evidence, True), (SCALE.evidence, False)], ["verdict", "calibration"])
-    assert "| calibration.misfit | 0.375 | 0 | - | 1 |" in text
+    assert "| calibration.misspecification | 0.375 | 0 | - | 1 |" in text
     assert "verdict.told_apart" in text.partition("No change")[2]  # 0.85 is told apart by 0.4 and 0.64, too
     assert "2 causes of known truth" in text
 

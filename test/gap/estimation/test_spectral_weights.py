@@ -24,21 +24,21 @@ def test_rows_of_noise_of_the_assumed_power_count_each_independent_sample_once(w
     """Sum of squares of white noise in the band: as many as there are independent samples of it, by its deviation."""
     power, random = np.full((windows.frequencies.size, 12), 4.0), np.random.default_rng(1)
     noise = windows.transform(2.0 * random.standard_normal((SAMPLES, 12)))
-    rows = real_rows(noise, weights(windows, power))
+    rows = real_rows(noise, weights(power))
     independent = 12 * 2 * windows.frequencies[-1] * SAMPLES / RATE
     assert np.sum(rows**2) == pytest.approx(independent, rel=0.05)
 
 
 def test_amplitudes_are_the_inverse_of_rows(windows) -> None:
     random = np.random.default_rng(2)
-    weight = weights(windows, random.uniform(0.5, 2.0, (windows.frequencies.size, 12)))
+    weight = weights(random.uniform(0.5, 2.0, (windows.frequencies.size, 12)))
     spectra = windows.transform(random.standard_normal((SAMPLES, 12)))
     np.testing.assert_allclose(amplitudes(real_rows(spectra, weight), weight), spectra, atol=1e-12)
 
 
 def test_slopes_are_weighted_as_residuals_are(windows) -> None:
     random = np.random.default_rng(3)
-    weight = weights(windows, random.uniform(0.5, 2.0, (windows.frequencies.size, 12)))
+    weight = weights(random.uniform(0.5, 2.0, (windows.frequencies.size, 12)))
     spectra = windows.transform(random.standard_normal((SAMPLES, 12, 2)))
     both = real_rows(spectra, weight)
     for k in range(2):

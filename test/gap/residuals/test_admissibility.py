@@ -25,7 +25,7 @@ def test_a_vane_that_is_three_degrees_off_is_no_other_aircraft(aircraft) -> None
     assert require_admissible(model) is model
 
 
-@pytest.mark.parametrize(("alpha", "stalled"), [(0.05, False), (0.2, True)])
+@pytest.mark.parametrize(("alpha", "stalled"), [(0.05, False), (0.2, True), (5.0, False)])
 def test_a_third_of_the_lift_is_a_stall_at_large_angles_only(plain_model, alpha: float, stalled: bool) -> None:
     exact_vane = Admission(vane_error=0.0)
     record, series = plain_model.record, plain_model.series.copy()

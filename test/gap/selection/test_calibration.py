@@ -13,7 +13,7 @@ from sysid_node.gap.selection.calibration import (
     evidence_of,
     is_misspecified,
     is_supported_but_misspecified,
-    misfit_of,
+    misspecification_of,
     prior_odds,
     regressors,
 )
@@ -24,18 +24,22 @@ LIMITS = THRESHOLDS.calibration
 NATS, MISFITS = st.floats(-1e3, 1e6), st.floats(0.0, 2.0)
 
 
-def evidence(nats: float, misfit: float = 0.0, flexible: bool = False) -> CauseEvidence:
-    return CauseEvidence(nats, misfit, flexible)
+def evidence(nats: float, misspecification: float = 0.0, flexible: bool = False) -> CauseEvidence:
+    return CauseEvidence(nats, misspecification, flexible)
 
 
 @given(NATS, st.floats(0.0, 1e5), MISFITS)
-def test_more_support_is_more_probable(nats: float, more: float, misfit: float) -> None:
-    assert calibrated_probability(evidence(nats, misfit)) <= calibrated_probability(evidence(nats + more, misfit))
+def test_more_support_is_more_probable(nats: float, more: float, misspecification: float) -> None:
+    assert calibrated_probability(evidence(nats, misspecification)) <= calibrated_probability(
+        evidence(nats + more, misspecification)
+    )
 
 
 @given(NATS, MISFITS, st.floats(0.0, 1.0))
-def test_misfit_counts_against_a_cause(nats: float, misfit: float, more: float) -> None:
-    assert calibrated_probability(evidence(nats, misfit + more)) <= calibrated_probability(evidence(nats, misfit))
+def test_misfit_counts_against_a_cause(nats: float, misspecification: float, more: float) -> None:
+    assert calibrated_probability(evidence(nats, misspecification + more)) <= calibrated_probability(
+        evidence(nats, misspecification)
+    )
 
 
 @given(NATS)
@@ -46,7 +50,7 @@ def test_a_flexible_effect_is_less_probable(nats: float) -> None:
 @given(NATS)
 def test_a_misspecified_cause_has_no_probability_however_large_its_support(nats: float) -> None:
     """The evidence for a wrong equation grows with the data."""
-    wrong = evidence(nats, 2.0 * LIMITS.misfit)
+    wrong = evidence(nats, 2.0 * LIMITS.misspecification)
     assert calibrated_probability(wrong) == 0.0
     assert is_supported_but_misspecified(wrong) is (calibrated_probability(evidence(nats)) >= LIMITS.probability)
     assert not is_supported_but_misspecified(evidence(nats))
@@ -54,7 +58,7 @@ def test_a_misspecified_cause_has_no_probability_however_large_its_support(nats:
 
 @pytest.mark.parametrize(("change", "misspecified"), [(-1e-9, False), (0.0, False), (1e-9, True)])
 def test_boundary_of_the_misfit(change: float, misspecified: bool) -> None:
-    assert is_misspecified(evidence(1e4, LIMITS.misfit + change)) is misspecified
+    assert is_misspecified(evidence(1e4, LIMITS.misspecification + change)) is misspecified
 
 
 def test_the_probability_is_the_logistic_regressions() -> None:
@@ -77,11 +81,11 @@ def test_no_support_is_not_probable_and_a_large_one_is() -> None:
 def test_prior_odds_are_lower_for_flexible_effects() -> None:
     assert prior_odds("actuator_lag") == 1.0
     assert prior_odds("mass_error") == pytest.approx(np.exp(LIMITS.flexible))
-    assert evidence_of("mass_error", 10.0, misfit_table(), LIMITS.windows).flexible
-    assert not evidence_of("actuator_lag", 10.0, misfit_table(), LIMITS.windows).flexible
+    assert evidence_of("mass_error", 10.0, misspecification_table(), LIMITS.windows).flexible
+    assert not evidence_of("actuator_lag", 10.0, misspecification_table(), LIMITS.windows).flexible
 
 
-def misfit_table(contributed: float = 90.0, deviations: float = 10.0) -> Misspecification:
+def misspecification_table(contributed: float = 90.0, deviations: float = 10.0) -> Misspecification:
     """The test of an effect on two channels: one as given, one that holds the rest and is fitted exactly."""
     return Misspecification(
         np.array([contributed, 100.0 - contributed]), np.array([10.0, 0.0]), np.array([deviations, 0.0])
@@ -89,21 +93,21 @@ def misfit_table(contributed: float = 90.0, deviations: float = 10.0) -> Misspec
 
 
 def test_misfit_is_the_amplitude_ratio_on_the_channels_where_it_is_significant() -> None:
-    assert misfit_of(misfit_table()) == pytest.approx(np.sqrt(10.0 / 90.0))
+    assert misspecification_of(misspecification_table()) == pytest.approx(np.sqrt(10.0 / 90.0))
 
 
 @pytest.mark.parametrize(("change", "counts"), [(-1e-9, False), (0.0, False), (1e-9, True)])
 def test_boundary_of_the_deviations_of_a_misfit(change: float, counts: bool) -> None:
-    assert (misfit_of(misfit_table(deviations=LIMITS.deviations + change)) > 0.0) is counts
+    assert (misspecification_of(misspecification_table(deviations=LIMITS.deviations + change)) > 0.0) is counts
 
 
 @pytest.mark.parametrize(("change", "counts"), [(-1e-6, False), (1e-6, True)])
 def test_a_channel_with_little_of_the_effect_does_not_count(change: float, counts: bool) -> None:
-    assert (misfit_of(misfit_table(contributed=100.0 * LIMITS.counted + change)) > 0.0) is counts
+    assert (misspecification_of(misspecification_table(contributed=100.0 * LIMITS.counted + change)) > 0.0) is counts
 
 
 def test_other_thresholds_decide_otherwise() -> None:
-    strict = replace(THRESHOLDS, calibration=replace(LIMITS, misfit=0.1))
+    strict = replace(THRESHOLDS, calibration=replace(LIMITS, misspecification=0.1))
     assert calibrated_probability(evidence(1e4, 0.2)) > 0.9
     assert calibrated_probability(evidence(1e4, 0.2), strict) == 0.0
 

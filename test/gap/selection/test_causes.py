@@ -20,9 +20,9 @@ def selected(late):
 
 
 def test_the_true_effect_is_the_cause(selected, late) -> None:
-    chosen, (cause,), doubted = selected
+    chosen, (cause,), rejected = selected
     assert chosen.fit.effects == {"command_delay"} == {cause.candidate.effect}
-    assert doubted == ()
+    assert rejected == ()
     assert cause.without is late[1]
 
 
@@ -31,8 +31,8 @@ def test_what_was_doubted_before_does_not_come_back(selected, late) -> None:
     fitter, base, candidates = late
     _, (cause,), _ = selected
     lag = fitter.add_candidate(base, candidates["actuator_lag"])
-    chosen, causes, doubted = select_causes(fitter, base, lag, [[lag]], [candidates["command_delay"]], [cause])
-    assert doubted[0] is cause
+    chosen, causes, rejected = select_causes(fitter, base, lag, [[lag]], [candidates["command_delay"]], [cause])
+    assert rejected[0] is cause
     assert "command_delay" not in chosen.fit.effects | {each.candidate.effect for each in causes}
 
 
@@ -40,7 +40,7 @@ def test_its_probability_is_its_share_of_the_calibrated_one(selected) -> None:
     _, (cause,), _ = selected
     assert cause.share > 0.95 and cause.share + sum(p for _, p in cause.alternatives) <= 1.0 + 1e-12
     assert cause.probability == pytest.approx(cause.share * calibrated_probability(cause.evidence))
-    assert cause.probability > 0.9 and cause.evidence.misfit < 0.2
+    assert cause.probability > 0.9 and cause.evidence.misspecification < 0.2
 
 
 def test_a_size_that_is_not_plausible_in_the_whole_explanation_is_no_cause(selected) -> None:

@@ -18,7 +18,7 @@ from sysid_node.sim import Simulator
 
 
 @pytest.fixture(scope="module")
-def misfit(aircraft):
+def evidence_for_gyro_scale(aircraft):
     """What a scale of the IMU leaves of what it does, fitted to a flight."""
 
     def of(flight):
@@ -34,20 +34,20 @@ def misfit(aircraft):
 
 
 @pytest.mark.parametrize("turbulence", ["none", "light"])
-def test_a_gyro_that_reads_low_is_one(misfit, make_flight, turbulence) -> None:
-    evidence = misfit(make_flight({"imu_scale": {"p": -0.2}}, seed=5, turbulence=turbulence))
-    assert evidence.misfit < 0.2
+def test_a_gyro_that_reads_low_is_one(evidence_for_gyro_scale, make_flight, turbulence) -> None:
+    evidence = evidence_for_gyro_scale(make_flight({"imu_scale": {"p": -0.2}}, seed=5, turbulence=turbulence))
+    assert evidence.misspecification < 0.2
     assert calibrated_probability(evidence) > 0.9
 
 
 @pytest.mark.parametrize("turbulence", ["none", "light"])
-def test_a_gyro_that_saturates_is_not_one_that_reads_low(misfit, make_flight, turbulence) -> None:
+def test_a_gyro_that_saturates_is_not_one_that_reads_low(evidence_for_gyro_scale, make_flight, turbulence) -> None:
     flight = make_flight({}, seed=5, turbulence=turbulence)
     rate = flight.record["p"]
     cut = np.clip(rate, -0.4 * np.abs(rate).max(), 0.4 * np.abs(rate).max())
     clipped = replace(flight.record, columns={**flight.record.columns, "p": cut})
-    evidence = misfit(replace(flight, record=clipped))
-    assert evidence.misfit > 0.4
+    evidence = evidence_for_gyro_scale(replace(flight, record=clipped))
+    assert evidence.misspecification > 0.4
     assert is_supported_but_misspecified(evidence)
 
 

@@ -1,17 +1,22 @@
 """Which causes are kept, from tables made by hand; truth: each rule, tie and boundary, and sums of probabilities."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sysid_node.gap.selection.acceptance import AddedSize, ChannelScores, ComparisonTable, RemainingPower
+from sysid_node.gap.selection.acceptance import (
+    AddedSize,
+    ChannelScores,
+    ComparisonScores,
+    ComparisonTable,
+    RemainingPower,
+)
 from sysid_node.gap.selection.retention import (
     CauseTable,
     Challenge,
-    SuccessorTable,
     combined_shares,
     kept_causes,
     next_challenge,
@@ -80,13 +85,24 @@ def test_a_supported_cause_whose_equation_looks_wrong_waits_until_unsupported_on
 
 
 def test_an_improbable_cause_is_challenged_however_often() -> None:
-    """It cannot come back: it is listed as doubted, and barred."""
+    """It cannot come back: it is listed as rejected, and barred."""
     improbable = replace(LAG, probability=0.1)
     assert next_challenge([improbable], frozenset({"actuator_lag"})) == Challenge(0, improbable=True)
 
 
-def candidate(label: str, share: float, score: float, probability: float = 0.9) -> SuccessorTable:
-    return SuccessorTable(label, share, score, ACCEPTED, probability)
+@dataclass(frozen=True)
+class Successor:
+    """The scores of one possible successor as plain values."""
+
+    label: str
+    share: float
+    score: float
+    comparison: ComparisonScores
+    probability: float
+
+
+def candidate(label: str, share: float, score: float, probability: float = 0.9) -> Successor:
+    return Successor(label, share, score, ACCEPTED, probability)
 
 
 def test_the_successor_has_the_largest_share_then_predicts_best() -> None:

@@ -45,10 +45,12 @@ def test_causes_predict_better_than_derivatives_and_file(errors: list[ErrorTable
 
 def test_derivatives_that_nothing_excuses_may_predict_a_little_better() -> None:
     close = GOOD._replace(after=0.52)
-    assert causes_stand([close], excused=False)
+    assert causes_stand([close], derivatives_plausible=False)
     assert not causes_stand([close])
-    assert not causes_stand([GOOD._replace(after=0.5 * THRESHOLDS.validation.unexcused)], excused=False)
-    assert not causes_stand([close._replace(before=0.5)], excused=False)
+    assert not causes_stand(
+        [GOOD._replace(after=0.5 * THRESHOLDS.validation.implausible_derivatives)], derivatives_plausible=False
+    )
+    assert not causes_stand([close._replace(before=0.5)], derivatives_plausible=False)
 
 
 def test_what_causes_take_away_of_a_reading_on_other_flight_is_no_weather() -> None:

@@ -8,7 +8,7 @@ import pytest
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.gap.verdict.decision import (
     CauseScores,
-    DoubtedScores,
+    RejectedCauseScores,
     SimulationScores,
     VerdictScores,
     closes_too_little,
@@ -28,7 +28,7 @@ CLOSED = SimulationScores(after=0.05, noise_floor=0.05, after_lower=0.04, noise_
 OPEN = replace(CLOSED, after=0.3, after_lower=0.25, shrink_upper=70.0)
 
 LAG = CauseScores("actuator_lag", share=0.95, power_removed=np.full(12, 0.5))
-MISSPECIFIED = DoubtedScores("imu_scale", supported_but_misspecified=True)
+MISSPECIFIED = RejectedCauseScores("imu_scale", supported_but_misspecified=True)
 
 
 def channels(value: float, rest: float = 0.0) -> np.ndarray:
@@ -39,7 +39,7 @@ def channels(value: float, rest: float = 0.0) -> np.ndarray:
 def table(**changes: object) -> VerdictScores:
     """An exciting flight, nothing left but noise; no cause, unless changed."""
     scores = VerdictScores(
-        signal_to_noise=1000.0, weather_suffices=False, externally_excited=True, causes=(), doubted=(),
+        signal_to_noise=1000.0, weather_suffices=False, externally_excited=True, causes=(), rejected=(),
         score_before=-500.0, score_after=-400.0, motion=np.ones(12), power_before=np.full(12, 0.6),
         power_after=np.full(12, 0.01), structure_deviations=np.zeros(12), structure_share=np.zeros(12),
         sampling=np.zeros(12), simulation=CLOSED,
@@ -67,9 +67,9 @@ STRUCTURED = {
         ({"externally_excited": False, "causes": (LAG,)}, "unsupported", "autopilot"),
         (STRUCTURED, "unknown_effect", "no effect explains it"),
         ({**STRUCTURED, "excited": np.array([0.0, *[1.0] * 11])}, "no_gap", "nothing that matters"),
-        ({"doubted": (MISSPECIFIED,)}, "unknown_effect", "misspecified"),
-        ({"doubted": (replace(MISSPECIFIED, replaced=True),)}, "no_gap", "nothing that matters"),
-        ({"doubted": (replace(MISSPECIFIED, supported_but_misspecified=False),)}, "no_gap", "nothing that matters"),
+        ({"rejected": (MISSPECIFIED,)}, "unknown_effect", "misspecified"),
+        ({"rejected": (replace(MISSPECIFIED, replaced=True),)}, "no_gap", "nothing that matters"),
+        ({"rejected": (replace(MISSPECIFIED, supported_but_misspecified=False),)}, "no_gap", "nothing that matters"),
         ({"simulation": OPEN}, "unknown_effect", "error is larger"),
         ({"simulation": None}, "no_gap", "nothing that matters"),
     ],
@@ -93,8 +93,8 @@ def test_verdicts_without_causes(changes: dict[str, object], verdict: str, reaso
         ({**STRUCTURED, "power_before": channels(0.11, 0.01)}, "unknown_effect", "too small a share"),
         ({**STRUCTURED, "causes": (replace(LAG, power_removed=channels(0.05)),)}, "unknown_effect", "more structure"),
         (STRUCTURED, "explained", "told apart"),  # the cause removes more on that channel than is left
-        ({"doubted": (MISSPECIFIED,)}, "unknown_effect", "misspecified"),
-        ({"doubted": (replace(MISSPECIFIED, replaced=True),)}, "explained", "told apart"),
+        ({"rejected": (MISSPECIFIED,)}, "unknown_effect", "misspecified"),
+        ({"rejected": (replace(MISSPECIFIED, replaced=True),)}, "explained", "told apart"),
     ],
 )
 def test_verdicts_with_causes(changes: dict[str, object], verdict: str, reason: str) -> None:
@@ -104,9 +104,9 @@ def test_verdicts_with_causes(changes: dict[str, object], verdict: str, reason: 
 
 
 def test_a_decision_names_causes_and_doubted_effects() -> None:
-    decision = decide(table(causes=(LAG, replace(LAG, label="cg_shift")), doubted=(MISSPECIFIED,)))
+    decision = decide(table(causes=(LAG, replace(LAG, label="cg_shift")), rejected=(MISSPECIFIED,)))
     assert decision.causes == ("actuator_lag", "cg_shift")
-    assert decision.doubted == ("imu_scale",)
+    assert decision.rejected == ("imu_scale",)
 
 
 @pytest.mark.parametrize(("change", "verdict"), [(-1e-9, "unsupported"), (0.0, "no_gap"), (1e-9, "no_gap")])
@@ -215,7 +215,7 @@ def test_the_unexplained_share_is_zero_where_nothing_is_structured() -> None:
     assert unexplained_share(table()) == 0.0
     structured = table(**STRUCTURED)
     assert unexplained_share(structured) == pytest.approx(1.0 - explained_share(structured)) != 0.0
-    assert unexplained_share(table(doubted=(MISSPECIFIED,), power_before=np.zeros(12))) == 0.0  # all of nothing
+    assert unexplained_share(table(rejected=(MISSPECIFIED,), power_before=np.zeros(12))) == 0.0  # all of nothing
 
 
 def test_other_thresholds_give_other_verdicts() -> None:

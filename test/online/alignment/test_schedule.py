@@ -1,16 +1,8 @@
-"""Estimates fall due at the same samples one by one and all at once."""
+"""Estimates fall due at the rate of publication, at the samples that are freshest then."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-
-from sysid_node.online.alignment.schedule import Schedule, due, due_times
-
-
-def one_by_one(time: np.ndarray, wait: np.ndarray, rate: float) -> np.ndarray:
-    schedule = Schedule(rate)
-    return time[[due(schedule, t, w) for t, w in zip(time.tolist(), wait.tolist(), strict=True)]]
+from due_times import due_times
 
 
 def at_once(time: np.ndarray) -> np.ndarray:
@@ -30,16 +22,6 @@ def test_jitter_does_not_move_an_estimate_to_a_neighbour(seed: int) -> None:
     jittered = regular + rng.uniform(-0.001, 0.001, regular.size)
     places = np.searchsorted(jittered, due_times(jittered, at_once(jittered), 20.0))
     np.testing.assert_array_equal(places, np.arange(10, 2001, 10))
-
-
-@given(
-    st.lists(st.tuples(st.floats(1e-4, 2.0), st.floats(0.0, 1.0)), min_size=1, max_size=200),
-    st.floats(0.01, 1000.0),
-)
-def test_one_by_one_equals_all_at_once(steps: list[tuple[float, float]], rate: float) -> None:
-    time = np.concatenate([[0.0], np.cumsum([step for step, _ in steps])])
-    wait = np.array([0.0, *(wait for _, wait in steps)])
-    np.testing.assert_array_equal(due_times(time, wait, rate), one_by_one(time, wait, rate))
 
 
 @pytest.mark.parametrize("late", [0.0, 1e-4, -1e-4])
@@ -70,4 +52,3 @@ def test_air_data_at_the_imus_rate_but_between_its_samples() -> None:
 def test_one_estimate_for_a_sample_after_a_long_gap() -> None:
     time = np.array([0.0, 0.01, 10.0, 10.01])
     assert due_times(time, at_once(time), 20.0).tolist() == [10.0]
-    assert one_by_one(time, at_once(time), 20.0).tolist() == [10.0]

@@ -8,7 +8,7 @@ from plant import made_aircraft
 from sysid_node.online.frequency.regression_signals import layout
 from sysid_node.online.regression import gust_correlation, normal_equations
 from sysid_node.online.regression.gust_correlation import ALLOWED, ANSWERED
-from sysid_node.online.regression.heteroskedasticity import DOUBT, NoiseMoments
+from sysid_node.online.regression.heteroskedasticity import EXCESS_RATIO, NoiseMoments
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ def inflation(of: Uncertainty, sensed: Array) -> Array:
 
 def test_sensor_noise_alone_is_no_reason_for_doubt() -> None:
     noise = np.array([1.0, 2.0])
-    np.testing.assert_allclose(inflation(spread(DOUBT * noise, 1e4), noise), 1.0)
+    np.testing.assert_allclose(inflation(spread(EXCESS_RATIO * noise, 1e4), noise), 1.0)
 
 
 def test_gusts_correlated_as_much_as_allowed_are_covered_whatever_the_length() -> None:

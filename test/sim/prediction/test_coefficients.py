@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from simulated_signals import SAMPLES, signals_from, smooth_inputs
+from simulated_signals import SAMPLES, coefficient_slopes, predicted_coefficients, signals_from, smooth_inputs
 
 from sysid_node.dynamics.vector import Vector
 from sysid_node.sim import EFFECTS, trim_flight
 from sysid_node.sim.prediction.accelerations import Accelerations
-from sysid_node.sim.prediction.coefficients import coefficient_slopes, coefficients, predict_coefficients
+from sysid_node.sim.prediction.coefficients import coefficients
 
 INNER = slice(40, -40)  # without the ends, where shifts and differences lack neighbours
 
@@ -45,8 +45,8 @@ def test_prediction_expects_what_the_rollout_shows(fast, effect):
     flight = fast.rollout(theta, trim.initial, inputs)
     signals = signals_from(flight, inputs.commands)
     measured = shown(fast, flight, signals)[INNER]
-    expected = np.asarray(predict_coefficients(fast, theta, signals))[INNER]
-    neutral = np.asarray(predict_coefficients(fast, fast.neutral(), signals))[INNER]
+    expected = predicted_coefficients(fast, theta, signals)[INNER]
+    neutral = predicted_coefficients(fast, fast.neutral(), signals)[INNER]
     error, effect_size = np.abs(expected - measured).max(axis=0), np.abs(neutral - measured).max(axis=0)
     scale = np.abs(measured).max(axis=0)
     share = 0.2 if effect == "structural_mode" else 0.05  # the mode's pitch rate also changes the probe's correction
@@ -58,7 +58,7 @@ def test_neutral_prediction_is_the_true_coefficients(fast):
     trim = trim_flight(fast)
     inputs = smooth_inputs(fast, trim)
     flight = fast.rollout(fast.neutral(), trim.initial, inputs)
-    expected = np.asarray(predict_coefficients(fast, fast.neutral(), signals_from(flight, inputs.commands)))
+    expected = predicted_coefficients(fast, fast.neutral(), signals_from(flight, inputs.commands))
     np.testing.assert_allclose(expected, flight.coefficients, atol=1e-10)
 
 
@@ -69,7 +69,7 @@ def test_turbulence_does_no_harm(fast):
     trim = trim_flight(fast)
     inputs = smooth_inputs(fast, trim)._replace(gusts=gusts)
     flight = fast.rollout(fast.neutral(), trim.initial, inputs)
-    expected = np.asarray(predict_coefficients(fast, fast.neutral(), signals_from(flight, inputs.commands)))
+    expected = predicted_coefficients(fast, fast.neutral(), signals_from(flight, inputs.commands))
     np.testing.assert_allclose(expected, flight.coefficients, atol=1e-10)
 
 
@@ -80,11 +80,11 @@ def test_slopes_agree_with_finite_differences(fast):
     for i, (_, parameter) in enumerate(fast.parameters):
         theta[i] = np.clip(parameter.neutral + 0.313 * fast.scales[i], parameter.lower, parameter.upper)
     signals = signals_from(fast.rollout(fast.neutral(), trim.initial, inputs), inputs.commands)
-    slopes = np.asarray(coefficient_slopes(fast, theta, signals))
+    slopes = coefficient_slopes(fast, theta, signals)
     for i, name in enumerate(fast.names):
         h = np.zeros(len(theta))
         h[i] = 1e-5 * fast.scales[i]
-        up, down = (np.asarray(predict_coefficients(fast, theta + s * h, signals)) for s in (1, -1))
+        up, down = (predicted_coefficients(fast, theta + s * h, signals) for s in (1, -1))
         numeric = (up - down) / (2 * h[i])
         size = np.abs(numeric).max()
         assert np.abs(slopes[:, :, i] - numeric).max() <= 1e-3 * size + 1e-9, name

@@ -5,12 +5,11 @@ import numpy as np
 import pytest
 from plain import make_aircraft
 from scipy.signal import lsim
-from simulated_signals import signals_from, smooth_inputs
+from simulated_signals import predicted_coefficients, signals_from, smooth_inputs
 
 from sysid_node.sim import Simulator, trim_flight
 from sysid_node.sim.model.chain import Chain
 from sysid_node.sim.model.layout import OUTPUTS
-from sysid_node.sim.prediction.coefficients import predict_coefficients
 from sysid_node.sim.prediction.structural_response import mode_response
 
 
@@ -51,5 +50,5 @@ def test_response_stays_bounded(slope, frequency):
     trim = trim_flight(slow)
     inputs = smooth_inputs(slow, trim)
     signals = signals_from(slow.rollout(slow.neutral(), trim.initial, inputs), inputs.commands)
-    without, expected = (np.abs(predict_coefficients(slow, t, signals)).max() for t in (slow.neutral(), theta))
+    without, expected = (np.abs(predicted_coefficients(slow, t, signals)).max() for t in (slow.neutral(), theta))
     assert expected < 3.0 * without

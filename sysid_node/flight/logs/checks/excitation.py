@@ -215,7 +215,7 @@ def _responses(grid: _Grid, axis: _Axis, movers: Sequence[int]) -> Array:
     for constant in _TIMES:
         design = np.hstack([slow, *(_laguerre(column, grid.step / constant) for column in inputs.T)])
         fits.append((_whitened_fit(design, grid.imu[:, axis.rate], grid.known, whole), design))
-    (_, coefficients, covariance), design = min(fits, key=lambda fit: fit[0].misfit)
+    (_, coefficients, covariance), design = min(fits, key=lambda fit: fit[0].mean_square)
     found = _unknown(len(movers))
     for i in range(len(movers)):
         own = slice(2 + _ORDER * i, 2 + _ORDER * (i + 1))
@@ -230,7 +230,7 @@ def _responses(grid: _Grid, axis: _Axis, movers: Sequence[int]) -> Array:
 class _Fit(NamedTuple):
     """Least-squares coefficients, their covariance, and what is left over, as a mean square."""
 
-    misfit: float
+    mean_square: float
     coefficients: Array
     covariance: Array
 
@@ -250,10 +250,10 @@ def _whitened_fit(design: Array, values: Array, known: NDArray[np.bool_], whole:
         y = lfilter(taps, [1.0], values)[_NOISE_ORDER:][whole]
         coefficients = np.linalg.lstsq(x, y, rcond=_SINGULAR)[0]
     left = y - x @ coefficients
-    misfit = float(left @ left) / left.size
+    mean_square = float(left @ left) / left.size
     inverse = np.linalg.pinv(x.T @ x, rcond=_SINGULAR**2, hermitian=True)
-    covariance = np.asarray(inverse * misfit * left.size / (left.size - x.shape[1]), np.float64)
-    return _Fit(misfit, np.asarray(coefficients, np.float64), covariance)
+    covariance = np.asarray(inverse * mean_square * left.size / (left.size - x.shape[1]), np.float64)
+    return _Fit(mean_square, np.asarray(coefficients, np.float64), covariance)
 
 
 def _laguerre(values: Array, share: float) -> Array:

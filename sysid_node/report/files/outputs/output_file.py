@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import os
 import shutil
@@ -13,6 +12,7 @@ from pathlib import Path
 from sysid_node.errors import InputError
 from sysid_node.flight.truth import truth_path
 from sysid_node.interruption import indivisible, on_interrupt
+from sysid_node.report.files.outputs.folder_lock import lock_folder
 from sysid_node.report.files.outputs.output_folder import refuse_inputs
 
 _BAG_SUFFIXES = (".mcap", ".db3")
@@ -97,16 +97,9 @@ def _reserve(path: Path) -> tuple[Path, int]:
     folder = _aside(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        lock = lock_folder(folder, f"bag {path}: another run is writing it; wait for it or choose another name")
     except OSError as error:
         raise _no_bag(path, error) from error
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(lock)
-        raise InputError(f"bag {path}: another run is writing it; wait for it or choose another name") from None
-    except OSError:
-        pass  # a file system without locks
     for item in folder.iterdir():  # of a run that was killed
         shutil.rmtree(item) if item.is_dir() else item.unlink()
     return folder, lock

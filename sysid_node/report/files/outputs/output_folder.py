@@ -7,7 +7,6 @@ files: a later run of the same command replaces these, and nothing else is ever 
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import shutil
@@ -18,6 +17,7 @@ from pathlib import Path
 
 from sysid_node.errors import InputError
 from sysid_node.interruption import indivisible, on_interrupt
+from sysid_node.report.files.outputs.folder_lock import lock_folder
 from sysid_node.version import VERSION
 
 STAGE, EARLIER = ".sysid-unfinished", ".sysid-earlier"
@@ -171,17 +171,9 @@ def _make(path: Path) -> list[Path]:
 def _lock(path: Path) -> int:
     """A descriptor that holds the folder's lock. Raises InputError where another run holds it."""
     try:
-        lock = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+        return lock_folder(path, f"--out {path}: another run is writing into it; wait for it or give another folder")
     except OSError as error:
         raise _not_writable(path, error) from error
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(lock)
-        raise InputError(f"--out {path}: another run is writing into it; wait for it or give another folder") from None
-    except OSError:
-        pass  # a file system without locks
-    return lock
 
 
 def _tidy(path: Path, made: list[Path]) -> None:

@@ -18,7 +18,7 @@ def flights(report: FleetReport) -> dict[str, Any]:
     """Rows by tail, with the share of a flight's estimates that is owed to the fleet."""
     owed: dict[str, list[float]] = {}
     for population in report.summary.populations.values():
-        for name, weight in zip(population.series.flight, population.owed.tolist(), strict=True):
+        for name, weight in zip(population.series.flight, population.fleet_weight.tolist(), strict=True):
             owed.setdefault(name, []).append(weight)
     of_tail: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for flight in report.results.flights:

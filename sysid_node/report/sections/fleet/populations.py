@@ -52,7 +52,7 @@ def _row(report: FleetReport, population: Population) -> dict[str, Any]:
         "mean": with_interval(fit.mean, fit.upper - fit.mean),
         "tails": _scatter(fit.tails, size, series.name),
         "within": _scatter(fit.flights, size, series.name),
-        "owed": f"{100 * float(np.median(population.owed)):.0f}\u202f%",
+        "owed": f"{100 * float(np.median(population.fleet_weight)):.0f}\u202f%",
         "file": NONE if difference is None else number(difference.file),
         "differs": "" if difference is None else _difference(difference.difference, difference.file, series.name),
         "significant": difference is not None and difference.significant,

@@ -119,14 +119,12 @@ def _aircraft(
         throttle=throttle,
         sensors=Sensors(imu=program.named_place("eyepoint")),
         ideal=True,
-        effects=_effects(model, servos, bool(throttle)),
+        effects=_effects(model, servos),
         tables=expansion.tables,
     )
 
 
-def _effects(
-    model: CoefficientModel, servos: Mapping[str, JsbsimServo], powered: bool
-) -> dict[str, dict[str, UncertainValue]]:
+def _effects(model: CoefficientModel, servos: Mapping[str, JsbsimServo]) -> dict[str, dict[str, UncertainValue]]:
     effects: dict[str, dict[str, UncertainValue]] = {}
     for control, servo in servos.items():
         for effect, size in servo.effects().items():
