@@ -248,7 +248,7 @@ class _Run:
         last = self.schedule.previous
         if last is None:
             Actuation.of(self.aircraft).require(self.joints, self.flight.name)
-            raise InputError(why_nothing_aligned(self.flight.name, self.spans, rejected))
+            raise InputError(why_nothing_aligned(self.flight.name, self.spans, rejected, self.settings.max_gap))
         estimator.complete(self.state)  # no further sample gives it time
         final = estimate(self.state, last)
         if still := self.state.inputs.unchanging.fault:
