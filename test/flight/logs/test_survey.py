@@ -159,7 +159,7 @@ def test_air_data_that_come_too_seldom_to_interpolate_between_are_told_with_the_
 
 
 def test_air_data_for_which_a_part_is_left_out_are_taken_with_a_remark(tmp_path):
-    """Truth: steps of 0.19 s and 0.21 s take turns, and the IMU's messages within the longer ones are left out: 52 %."""
+    """Truth: steps of 0.19 s and 0.21 s take turns, and the IMU messages in the longer ones are left out: 52 %."""
     found = surveyed(tmp_path, with_air_data_at(5.0, later=0.01))
     assert row(found, "airspeed").verdict == "over 5 Hz needed"
     assert found.sparse == ""
