@@ -413,8 +413,6 @@ def test_an_imu_that_is_interrupted_every_second_is_warned_of(tmp_path):
     arrival = Arrival(*(getattr(whole.imu.arrival, name)[kept] for name in ("stamp_ns", "log_ns", "order")))
     imu = replace(whole.imu, arrival=arrival, values=whole.imu.values[kept], attitude=whole.imu.attitude[kept])
     write_streams(tmp_path / "holed", replace(whole, imu=imu))
-    with pytest.warns(
-        InputWarning, match=r"holed: \d+ interruptions of up to 0\.2. s .*set max_gap \(0\.2 s\) to"
-    ):
+    with pytest.warns(InputWarning, match=r"holed: \d+ interruptions of up to 0\.2. s .*set max_gap \(0\.2 s\) to"):
         found = replay(load(tmp_path / "holed", "cdrw"), judge_faults=False)
     assert {d.status for d in found.final.derivatives.values()} == {"converging"}
