@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.api.data_frames import data_frame
+from sysid_node.flight.align import MAX_GAP
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.logs.opening import load_flight_record
 from sysid_node.flight.record import FlightRecord
@@ -39,7 +40,7 @@ class FlightFile:
     @cached_property
     def record(self) -> FlightRecord:
         """The aligned samples: SI units and radians, body axes forward-right-down. Raises InputError."""
-        return self.aligned(max_gap=0.2)
+        return self.aligned(max_gap=MAX_GAP)
 
     def aligned(self, max_gap: float, carried: str = "auto") -> FlightRecord:
         """The samples, those left out that stand more than ``max_gap`` s from a message. Raises InputError.

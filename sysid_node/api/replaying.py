@@ -248,11 +248,13 @@ class _Run:
         last = self.schedule.previous
         if last is None:
             Actuation.of(self.aircraft).require(self.joints, self.flight.name)
-            raise InputError(why_nothing_aligned(self.flight.name, self.spans, rejected))
+            raise InputError(why_nothing_aligned(self.flight.name, self.spans, rejected, self.settings.max_gap))
         estimator.complete(self.state)  # no further sample gives it time
         final = estimate(self.state, last)
-        if still := self.state.inputs.unchanging.fault:
-            warnings.warn(f"{self.flight.name}: {still}", InputWarning, stacklevel=2)
+        inputs = self.state.inputs
+        broken = inputs.interruptions.fault(inputs.previous[0], self.settings.max_gap) if inputs.previous else ""
+        for wrong in filter(None, (inputs.unchanging.fault, broken)):
+            warnings.warn(f"{self.flight.name}: {wrong}", InputWarning, stacklevel=2)
         seconds = last - self.began
         if seconds < FIRST_ESTIMATE and not any(math.isfinite(d.value) for d in final.derivatives.values()):
             raise InputError(too_short_to_replay(self.flight.name, seconds))

@@ -102,7 +102,7 @@ def init(aircraft: Aircraft, settings: ExcitationSettings) -> ExciterState:
     table = np.column_stack([drawn.deflections[name] for name in aircraft.controls])
     if np.abs(table).max() > settings.largest_amplitude:
         raise InputError(
-            f"manoeuvre {drawn.spec!r}: moves {np.abs(table).max():.3g} rad, more than the largest amplitude "
+            f"manoeuvre {drawn.name!r}: moves {np.abs(table).max():.3g} rad, more than the largest amplitude "
             f"{settings.largest_amplitude:g}; lower it"
         )
     return ExciterState(aircraft, settings, table, EstimateWatch(settings.derivatives))

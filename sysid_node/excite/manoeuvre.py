@@ -28,6 +28,12 @@ class Manoeuvre:
     time: Array
     deflections: Mapping[str, Array]
     spec: str
+    source: str = ""  # the spec as the user wrote it; empty where nobody did
+
+    @property
+    def name(self) -> str:
+        """What messages call it: the user's own words where there are any."""
+        return self.source or self.spec
 
     @property
     def duration(self) -> float:
@@ -66,7 +72,7 @@ def check_thrust(manoeuvre: Manoeuvre, aircraft: Aircraft, thrust: Array) -> Non
     worst = int(beyond.argmax())
     if beyond[worst] > 1e-9:
         raise InputError(
-            f"manoeuvre {manoeuvre.spec!r}: trim included, {THROTTLE} reaches {share[worst]:.4g} at "
+            f"manoeuvre {manoeuvre.name!r}: trim included, {THROTTLE} reaches {share[worst]:.4g} at "
             f"{manoeuvre.time[worst]:.2f} s, but {aircraft.name} allows 0 to {high:g}; lower the amplitude"
         )
 
@@ -78,6 +84,6 @@ def check_limits(manoeuvre: Manoeuvre, aircraft: Aircraft) -> None:
         worst, unit = int(size.argmax()), "" if name == THROTTLE else " rad"
         if size[worst] > limit * (1 + 1e-9):
             raise InputError(
-                f"manoeuvre {manoeuvre.spec!r}: {name} moves {size[worst]:.4g}{unit} from trim at "
+                f"manoeuvre {manoeuvre.name!r}: {name} moves {size[worst]:.4g}{unit} from trim at "
                 f"{manoeuvre.time[worst]:.2f} s, but {aircraft.name}'s limit is {limit:g}{unit}; lower the amplitude"
             )

@@ -19,7 +19,7 @@ from sysid_node.errors import InputError
 from sysid_node.excite.information import FisherInformation
 from sysid_node.excite.prediction import Prediction, Predictor, tolerances_of
 from sysid_node.excite.search_space import SearchSpace
-from sysid_node.excite.segment import ManoeuvreSegment
+from sysid_node.excite.segment import ManoeuvreSegment, as_written
 from sysid_node.flight.record import FlightRecord
 
 Array = NDArray[np.float64]
@@ -137,7 +137,7 @@ class _Search:
                 return point
             halved = [replace(s, amplitude=tuple(0.5 * a for a in s.amplitude)) for s in self.space.decode(point)]
             point = self.space.encode(halved)
-        spec = "+".join(segment.text() for segment in self.space.segments)
+        spec = as_written(self.space.segments)
         raise InputError(f"manoeuvre {spec!r}: leaves the envelope however small its amplitudes; allow a wider one")
 
     def cost(self, point: Array) -> float:

@@ -173,6 +173,6 @@ def _check_travel(aircraft: Aircraft, manoeuvre: Manoeuvre, commands: Array) -> 
         worst = int(beyond.argmax())
         if beyond[worst] > 1e-9:
             raise InputError(
-                f"manoeuvre {manoeuvre.spec!r}: trim included, {name} reaches {commands[worst, i]:.4g} at "
+                f"manoeuvre {manoeuvre.name!r}: trim included, {name} reaches {commands[worst, i]:.4g} at "
                 f"{manoeuvre.time[worst]:.2f} s, but {aircraft.name} allows {low:g} to {high:g}; lower the amplitude"
             )

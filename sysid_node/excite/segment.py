@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ class ManoeuvreSegment:
     controls: tuple[str, ...]
     amplitude: tuple[float, ...]  # one per control
     values: Mapping[str, float]  # every key of the kind and of COMMON_KEYS
+    source: str = field(default="", compare=False)  # the term as the user wrote it; empty where nobody did
 
     @property
     def length(self) -> float:
@@ -57,7 +58,7 @@ class ManoeuvreSegment:
             try:
                 total += KINDS[self.kind].draw(local, self.values, len(self.controls))
             except InputError as error:
-                raise InputError(f"manoeuvre {self.text()!r}: {error}") from error
+                raise InputError(f"manoeuvre {as_written([self])!r}: {error}") from error
         return np.array(self.amplitude)[:, None] * total
 
     def text(self) -> str:
@@ -66,6 +67,11 @@ class ManoeuvreSegment:
         known = {**KINDS[self.kind].keys, **COMMON_KEYS}
         rest = [f"{key}={value:g}" for key, value in self.values.items() if value != known[key].default]
         return ":".join([self.kind, ",".join(self.controls), f"amplitude={amplitude}", *rest])
+
+
+def as_written(segments: Sequence[ManoeuvreSegment]) -> str:
+    """The spec of segments as the user wrote it, for messages: a term that moves controls in turn is one."""
+    return "+".join(dict.fromkeys(segment.source or segment.text() for segment in segments))
 
 
 def moved(segment: ManoeuvreSegment, start: float) -> ManoeuvreSegment:
@@ -80,13 +86,13 @@ def draw_manoeuvre(
 
     Raises InputError where the flight is too short for them, or a deflection passes its control's limit.
     """
-    spec = "+".join(segment.text() for segment in segments)
-    time = _time_base(spec, segments, rate, duration)
+    time = _time_base(segments, rate, duration)
     deflections = {name: np.zeros(time.size) for name in control_limits(aircraft)}
     for segment in segments:
         for control, values in zip(segment.controls, segment.draw(time), strict=True):
             deflections[control] += values
-    manoeuvre = Manoeuvre(time, deflections, spec)
+    spec = "+".join(segment.text() for segment in segments)
+    manoeuvre = Manoeuvre(time, deflections, spec, as_written(segments))
     check_limits(manoeuvre, aircraft)
     return manoeuvre
 
@@ -100,19 +106,19 @@ def check_sampling(segments: Sequence[ManoeuvreSegment], rate: float) -> None:
         highest = segment.values.get("high", 0.0)
         if highest > rate / 2:
             raise InputError(
-                f"manoeuvre {segment.text()!r}: {highest:g} Hz cannot be drawn at {rate:g} Hz; sample at least twice "
-                "as fast, or lower high"
+                f"manoeuvre {as_written([segment])!r}: {highest:g} Hz cannot be drawn at {rate:g} Hz; sample at least "
+                "twice as fast, or lower high"
             )
         width = segment.values.get("width")
         if width is not None and width * rate < _STEP_SAMPLES - 1e-9:
             raise InputError(
-                f"manoeuvre {segment.text()!r}: steps of {width:g} s cannot be drawn at {rate:g} Hz; make them at "
-                f"least {_STEP_SAMPLES / rate:g} s long"
+                f"manoeuvre {as_written([segment])!r}: steps of {width:g} s cannot be drawn at {rate:g} Hz; make them "
+                f"at least {_STEP_SAMPLES / rate:g} s long"
             )
 
 
-def _time_base(spec: str, segments: Sequence[ManoeuvreSegment], rate: float, duration: float | None) -> Array:
-    end = max(segment.end for segment in segments)
+def _time_base(segments: Sequence[ManoeuvreSegment], rate: float, duration: float | None) -> Array:
+    spec, end = as_written(segments), max(segment.end for segment in segments)
     total = end + TAIL if duration is None else duration
     if total < end - 1e-9:
         raise InputError(f"manoeuvre {spec!r}: lasts until {end:g} s, but the flight {total:g} s; fly longer")

@@ -87,10 +87,9 @@ def _segment(
         raise _error(text, f"every is {values['every']:g} s, but it lasts {length:g} s; begin again after its end")
     said = given.get("amplitude")
     if said is None:
-        return ManoeuvreSegment(
-            kind, controls, tuple(_usual_amplitude(text, control, aircraft, airspeed) for control in controls), values
-        )
-    return ManoeuvreSegment(kind, controls, _amplitude(text, said, controls), values)
+        usual = tuple(_usual_amplitude(text, control, aircraft, airspeed) for control in controls)
+        return ManoeuvreSegment(kind, controls, usual, values, text)
+    return ManoeuvreSegment(kind, controls, _amplitude(text, said, controls), values, text)
 
 
 def _in_turn(segment: ManoeuvreSegment) -> list[ManoeuvreSegment]:
@@ -115,7 +114,12 @@ def _error(text: str, problem: str, word: str = "", known: Mapping[str, object] 
 def _controls(text: str, names: str, aircraft: Aircraft) -> tuple[str, ...]:
     limits = control_limits(aircraft)
     if not names:
-        return tuple(name for name in limits if name != THROTTLE)
+        surfaces = tuple(name for name in limits if name != THROTTLE)
+        if not surfaces:
+            raise _error(text, f"{aircraft.name} has no surfaces that it could move")
+        return surfaces
+    if not limits:
+        raise _error(text, f"{aircraft.name} has no controls")
     controls = tuple(name.strip() for name in names.split(","))
     for name in controls:
         if name not in limits:

@@ -46,6 +46,7 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 
 STEP_BACK_NS = 1_000_000_000  # a larger step back means that the clock was set, not that a message was late
 STEP_FORWARD_NS = 300_000_000_000  # a larger step forward means the same
+MAX_GAP = 0.2  # s: the usual ``max_gap``
 BUFFER_NS = 5_000_000_000  # how long messages of a topic are kept while the others are awaited
 
 AIR_INTERVAL = "air_interval"
@@ -293,7 +294,7 @@ def flight_record(
     aligned = align(aircraft, streams, max_gap, carried, afterwards=True, servos=servos)
     _require_one_clock(streams, aligned)
     if aligned.used.size < 2:
-        raise InputError(why_nothing_aligned(streams.name, stamp_spans(streams), aligned.rejected))
+        raise InputError(why_nothing_aligned(streams.name, stamp_spans(streams), aligned.rejected, max_gap))
     samples, names = aligned.samples, sample_columns(aircraft)
     if samples.shape[1] > len(names):
         first = len(names) - len(aircraft.controls)
@@ -342,11 +343,14 @@ def joined_spans(
 
 
 def why_nothing_aligned(
-    name: str, spans: Mapping[str, tuple[float, float]], rejected: Mapping[str, Mapping[str, int]]
+    name: str,
+    spans: Mapping[str, tuple[float, float]],
+    rejected: Mapping[str, Mapping[str, int]],
+    max_gap: float = MAX_GAP,
 ) -> str:
     """One line: topics of a single time, or spans that do not overlap, else the most frequent reasons of rejection.
 
-    ``name`` is the flight's, ``spans`` as of ``stamp_spans``.
+    ``name`` is the flight's, ``spans`` as of ``stamp_spans``, ``max_gap`` (s) as of ``align``.
     """
     single = [topic for topic, (start, stop) in spans.items() if start == stop]
     if single:
@@ -358,5 +362,6 @@ def why_nothing_aligned(
     reasons = "; ".join(f"{count} x {reason}" for reason, count in worst) or "fewer than two IMU messages"
     rare = [topic for topic in (AIR_DATA, ACTUATORS) if worst and worst[0][0] == f"{IMU}: {gap(topic)}"]
     usual = "correct the messages or the aircraft file"
-    remedy = f"{rare[0]} must come more often, or max_gap be longer" if rare else usual
+    often = f"at least every {max_gap:g} s ({1.0 / max_gap:.3g} Hz)"
+    remedy = f"{rare[0]} must come {often}, or max_gap be longer" if rare else usual
     return f"{name}: no two samples could be aligned: {reasons}; {remedy}"

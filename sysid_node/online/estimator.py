@@ -222,6 +222,7 @@ def _append(state: EstimatorState, time: float, sample: Sequence[float], excess:
     renew_early(state)
     inputs.previous = (time, motion)
     if previous is None or time - previous[0] > model.settings.max_gap:
+        inputs.interruptions.add(previous[0] if previous else None, time)
         interrupt(state)  # before the servos move on
         _follow(state, time, sample, (), row[OFFSET])
         sampled_transform.begin_at(state.transform, time, row)

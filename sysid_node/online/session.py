@@ -84,6 +84,14 @@ class Session:
         return self.state.inputs.unchanging.fault
 
     @property
+    def interruptions(self) -> str:
+        """That the samples come in parts too short to estimate from, in words; empty where they do not."""
+        inputs = self.state.inputs
+        if inputs.previous is None:
+            return ""
+        return inputs.interruptions.recent_fault(inputs.previous[0], self.settings.max_gap)
+
+    @property
     def lift_fault(self) -> str:
         """What does not go together of weight, airspeed and angle of attack, in words; empty where nothing is wrong."""
         return "" if self.force_fault else self.lift.fault

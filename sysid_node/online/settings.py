@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any, get_type_hints
 
 from sysid_node.errors import InputError
+from sysid_node.flight.align import MAX_GAP
 from sysid_node.flight.commanded import CARRIED
 from sysid_node.setting import check_frequencies, parse_setting
 from sysid_node.suggestion import did_you_mean
@@ -35,7 +36,7 @@ class OnlineSettings:
     forgetting_time: float = 0.0  # s: older data count e^-1; 0 = nothing is forgotten
     window: float = 0.0  # s: only the last so many seconds count; 0 = the whole record
     settle_time: float = 0.5  # s left out at the start, while filters and pilots settle
-    max_gap: float = 0.2  # s: the longest gap in the data that is bridged by interpolation
+    max_gap: float = MAX_GAP  # s: the longest gap in the data that is bridged by interpolation
     actuators: str = "auto"  # what the topic actuators carries: "commands", "positions", or "auto", by the messages
     use_prior: bool = False  # whether the aircraft file's derivatives count, by their tolerances
     detect_changes: bool = True  # forget what was before an abrupt change of the aircraft

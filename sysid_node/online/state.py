@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.flight.live.interruptions import Interruptions
 from sysid_node.flight.live.mean_force import RecentMeanForce
 from sysid_node.flight.live.unchanging import UnchangingReadings
 from sysid_node.online.alignment.flow_angle_filter import FlowAngleFilter
@@ -228,6 +229,7 @@ class EstimatorInputs:
     thrust_known: bool | None = None  # whether the first sample had one; None = none has come yet
     force: RecentMeanForce = field(default_factory=RecentMeanForce)  # specific force along z
     unchanging: UnchangingReadings = field(default_factory=UnchangingReadings)
+    interruptions: Interruptions = field(default_factory=Interruptions)
 
 
 @dataclass(frozen=True)

@@ -245,9 +245,8 @@ class Identifier(CarefulNode):
         monitors, rejected = list(self._monitors.values()), session.rejected
         recent = self._recent.update(monitors, rejected)
         readings, max_gap = (session.force_fault, session.unchanging), session.settings.max_gap
-        message.status.append(
-            source.input(monitors, rejected, stale_after, recent, readings, max_gap, session.lift_fault)
-        )
+        doubt = "; ".join(filter(None, (session.lift_fault, session.interruptions)))
+        message.status.append(source.input(monitors, rejected, stale_after, recent, readings, max_gap, doubt))
         self._warn(session, monitors, recent)
         if not session.samples:
             message.status += [source.waits("estimate"), source.waits("computation")]
@@ -289,6 +288,8 @@ class Identifier(CarefulNode):
             present["readings"] = session.unchanging
         if session.lift_fault:
             present["lift"] = session.lift_fault
+        if session.interruptions:
+            present["samples"] = session.interruptions
         if session.samples and lag_level(self._lag) != DiagnosticStatus.OK:
             present["estimates"] = lag_words(self._lag)
         say(self, self._conditions.update(present))

@@ -133,3 +133,31 @@ def test_the_documentation_names_every_kind_and_its_examples_parse():
     assert len(examples) >= 4
     for example in examples:
         parse_manoeuvre(example, CDRW)
+
+
+@pytest.mark.parametrize("throttle", [CDRW.throttle, None])
+@pytest.mark.parametrize("spec", ["3211", "multisine"])
+def test_an_aircraft_without_surfaces_is_said_with_the_users_own_text(spec, throttle):
+    with pytest.raises(InputError, match=rf"^manoeuvre '{spec}': cdrw has no surfaces that it could move$"):
+        parse_manoeuvre(spec, replace(CDRW, controls={}, throttle=throttle))
+
+
+def test_no_control_is_expected_of_an_aircraft_without_any():
+    with pytest.raises(InputError, match=r"^manoeuvre 'doublet:elevator': cdrw has no controls$"):
+        parse_manoeuvre("doublet:elevator", replace(CDRW, controls={}, throttle=None))
+
+
+@pytest.mark.parametrize(
+    ("spec", "problem"),
+    [
+        ("3211:amplitude=0.5", "elevator moves 0.5 rad from trim"),
+        ("3211:amplitude=0.2+doublet:elevator:amplitude=0.2", "elevator moves 0.4 rad from trim"),
+        ("3211:width=0.001", "steps of 0.001 s cannot be drawn"),
+        ("3211:repeat=9", "lasts until"),
+    ],
+)
+def test_what_cannot_be_flown_is_said_with_the_users_own_text(spec, problem):
+    """And not with the terms that move one control after the other, which the user did not write."""
+    with pytest.raises(InputError) as caught:
+        parse_manoeuvre(spec, CDRW, duration=20.0)
+    assert str(caught.value).startswith(f"manoeuvre '{spec}': {problem}")

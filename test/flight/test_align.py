@@ -191,9 +191,9 @@ def test_the_end_of_the_recording_is_not_a_rejection():
     [
         (
             {"imu/data": {"air_data gap": 90}, "air_data": {"out of order": 9}},
-            "air_data must come more often, or max_gap",
+            "air_data must come at least every 0.2 s (5 Hz), or max_gap be longer",
         ),
-        ({"imu/data": {"actuators gap": 90}}, "actuators must come more often, or max_gap be longer"),
+        ({"imu/data": {"actuators gap": 90}}, "actuators must come at least every 0.2 s (5 Hz), or max_gap be longer"),
         (
             {"imu/data": {"actuators gap": 90}, "actuators": {"no stamp": 91}},
             "correct the messages or the aircraft file",
@@ -205,3 +205,9 @@ def test_what_to_do_where_nothing_is_aligned(rejected: dict[str, dict[str, int]]
     said = why_nothing_aligned("flight", spans, rejected)
     assert remedy in said
     assert "\n" not in said
+
+
+def test_what_is_said_where_nothing_is_aligned_is_of_the_gap_that_was_asked_for() -> None:
+    spans = dict.fromkeys(("imu/data", "air_data", "actuators"), (0.0, 9.0))
+    said = why_nothing_aligned("flight", spans, {"imu/data": {"air_data gap": 90}}, max_gap=0.5)
+    assert "air_data must come at least every 0.5 s (2 Hz)" in said

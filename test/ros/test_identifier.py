@@ -211,6 +211,21 @@ def test_a_missing_topic_is_named(probe: Probe) -> None:
         assert not probe.estimates
 
 
+def test_an_imu_that_is_interrupted_every_second_is_said(probe: Probe) -> None:
+    """On /diagnostics and in the log: else all derivatives would converge for ever, without a reason."""
+    flight = made_up_streams(13.0)
+    said: list[str] = []
+    with ended(start_identifier(), said):
+        probe.await_identifier()
+        for second in range(13):
+            probe.speak(flight, start=second + 0.3, stop=second + 1.0)
+        probe.until(lambda: "interruptions" in words(probe, "input", level=1))
+        told = words(probe, "input", level=1)
+    assert "no longer part without one than 0.7 s: estimates need 4 s or more" in told
+    assert "samples: " in said[0]
+    assert "interruptions of up to 0.3" in said[0]
+
+
 def test_wrong_joints_are_said_with_what_was_expected_and_what_came(probe: Probe) -> None:
     """In a namespace: its names carry it, on /diagnostics and in the log."""
     process = start_identifier(namespace="/uav1")

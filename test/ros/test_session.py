@@ -1,6 +1,7 @@
 """A session: messages in, estimates out, in the time of the data."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from harness import ROOT, START_NS, made_up_streams
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag.reader import read_streams
-from sysid_node.flight.streams import Streams
+from sysid_node.flight.streams import Arrival, Streams
 from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.replay import run
 from sysid_node.online.session import Due, Session
@@ -30,6 +31,14 @@ def fly(session: Session, flight: Streams, order: str) -> list[Due]:
         for stamp, row in zip(stream.arrival.stamp_ns.tolist(), values.tolist(), strict=True)
     )
     return [due for stamp, _, letter, row in messages for due in take[letter][2](stamp, tuple(row))]
+
+
+def without_a_part_of_each_second(flight: Streams, hole: float) -> Streams:
+    """The flight whose IMU was silent for the first ``hole`` s of each second."""
+    imu = flight.imu
+    kept = (imu.arrival.stamp_ns - START_NS) % 10**9 >= hole * 1e9
+    arrival = Arrival(imu.arrival.stamp_ns[kept], imu.arrival.log_ns[kept], imu.arrival.order[kept])
+    return replace(flight, imu=replace(imu, arrival=arrival, values=imu.values[kept], attitude=imu.attitude[kept]))
 
 
 @pytest.fixture
@@ -113,3 +122,13 @@ def test_airspeed_in_another_unit_is_said_in_flight(session: Session, scale: flo
     flight.air_data.values[:, 0] *= scale
     fly(session, flight, "iaj")
     assert ("is the airspeed in m/s" in session.lift_fault) == said
+
+
+@pytest.mark.parametrize(("hole", "said"), [(0.25, True), (0.15, False)])
+def test_an_imu_that_is_interrupted_every_second_is_said_in_flight(session: Session, hole: float, said: bool) -> None:
+    """Nothing is ever estimated from parts that short; a hole shorter than ``max_gap`` is bridged."""
+    flight = made_up_streams(12.0)
+    fly(session, without_a_part_of_each_second(flight, hole), "iaj")
+    assert ("interruptions of up to 0.2" in session.interruptions) == said
+    session.reset()
+    assert session.interruptions == ""

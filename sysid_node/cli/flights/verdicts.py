@@ -47,7 +47,7 @@ Refusals = Mapping[str, str]  # command -> why it does not take the flight; empt
 
 def refusals_told(found: LogSurvey) -> dict[str, str]:
     """What the commands will refuse, as far as the flight's file alone tells."""
-    always = found.refusal.text
+    always = found.refusal.text or found.sparse
     whole = always or found.two_clocks
     short = "" if found.uninterrupted >= SHORTEST_FOR_GAP else _too_short(found.uninterrupted)
     lacks = f"no complete {', '.join(found.gap_lacks)}; the gap cannot be measured without" if found.gap_lacks else ""

@@ -41,8 +41,8 @@ _RATE, _HELD_RATE = 200.0, 1000.0
 _HEIGHT = 100.0
 #: Multiple of the file's noise where none is given.
 _NOISE = 1.0
-#: Memory of a step of the integration with its outputs and messages, as measured on flights of 5 and 20 minutes.
-_BYTES_A_STEP = 1800.0
+#: Memory of a step of the integration with its outputs and messages, as measured on flights of 3 and 10 minutes.
+_BYTES_A_STEP = 1000.0
 #: Flow angle (rad) beyond which no file's derivatives describe the flight.
 _TUMBLED = np.pi / 4
 #: Failures that reduce the effect of a surface; a stuck surface does so relative to its command.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.actuation import joint_names
-from sysid_node.flight.align import flight_record
+from sysid_node.flight.align import MAX_GAP, flight_record
 from sysid_node.flight.autopilots.base import AdapterSettings
 from sysid_node.flight.autopilots.joints import require_known
 from sysid_node.flight.autopilots.recorded_topics import autopilot_of
@@ -112,7 +112,7 @@ def load_flight_record(
     *,
     topics: Mapping[str, str] | None = None,
     frame: BodyFrame = "flu",
-    max_gap: float = 0.2,
+    max_gap: float = MAX_GAP,
     carried: str = "positions",
 ) -> FlightRecord:
     """Any flight as aligned columns, with ``max_gap`` (s) as in ``align``. Raises InputError.

@@ -65,25 +65,31 @@ class FlightSampler:
         else:
             controls = self._controls(sortie, times[2])
         imu, air, actuators = self._arrivals(times, random)
-        inertial, flow = self._readings(sortie, times[0]), self._readings(sortie, times[1])
+        inertial, flow = self._readings(sortie, times[0], range(9)), self._readings(sortie, times[1], range(9, 12))
         altitude = np.interp(times[1], _grid(sortie), -np.asarray(sortie.flight.states[:, 2]))
         density = np.round(np.asarray(air_density(altitude, jnp)), 5)
         return Streams(
             ImuStream(imu, inertial[:, :6], inertial[:, 6:9], "imu"),
-            AirDataStream(air, np.column_stack([flow[:, 9:], density])),
+            AirDataStream(air, np.column_stack([flow, density])),
             JointStream(actuators, *_joints(sortie.simulator.aircraft, controls)),
             f"simulated {sortie.simulator.aircraft.name}",
         )
 
-    def _readings(self, sortie: Sortie, times: Array) -> Array:
-        """Readings (N, 12) at times (N,), s: the motion by cubic interpolation, the noise of the nearest sample."""
-        grid, outputs = _grid(sortie), np.asarray(sortie.flight.outputs)
-        noise = _noise(sortie)
+    def _readings(self, sortie: Sortie, times: Array, columns: range) -> Array:
+        """Readings (N, columns) at times (N,), s: the motion by cubic interpolation, the noise of the nearest sample.
+
+        One column after the other: the coefficients of all would take more memory than the flight itself.
+        """
+        grid, scale = _grid(sortie), sortie.effects.get("sensor_noise", {}).get("scale", 0.0)
         nearest = np.clip(np.round(times * sortie.simulator.rate).astype(int), 0, len(grid) - 1)
-        readings = CubicSpline(grid, outputs - noise)(times) + noise[nearest]
-        steps = np.where(_STEPS > 0.0, _STEPS, 1.0)
-        rounded: Array = np.where((_STEPS > 0.0) & self.quantise, np.round(readings / steps) * steps, readings)
-        return rounded
+        outputs, inputs = np.asarray(sortie.flight.outputs), np.asarray(sortie.inputs.noise)
+        readings = np.empty((times.size, len(columns)))
+        for k, column in enumerate(columns):
+            noise = np.asarray(scale * sortie.simulator.model.noise[column]) * inputs[:, column]
+            values = CubicSpline(grid, outputs[:, column] - noise)(times) + noise[nearest]
+            step = _STEPS[column]
+            readings[:, k] = np.round(values / step) * step if self.quantise and step > 0.0 else values
+        return readings
 
     def _controls(self, sortie: Sortie, times: Array) -> Array:
         """Controls and thrust (N, controls + 1), rad and N, as the actuators' messages contain them."""
@@ -127,12 +133,6 @@ class FlightSampler:
 def _grid(sortie: Sortie) -> Array:
     """Times (N,) of the simulator's samples, s."""
     return np.arange(len(sortie.flight.outputs), dtype=float) * np.float64(sortie.simulator.step)
-
-
-def _noise(sortie: Sortie) -> Array:
-    """White noise (N, 12) that is part of the flight's outputs."""
-    scale = sortie.effects.get("sensor_noise", {}).get("scale", 0.0)
-    return np.asarray(scale * sortie.simulator.model.noise * sortie.inputs.noise)
 
 
 def _instants(rate: float, span: float, jitter: float, random: np.random.Generator) -> Array:

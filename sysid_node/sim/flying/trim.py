@@ -65,8 +65,10 @@ def trim_flight(
     ``airspeed`` m/s (default: that of the reference condition), ``theta`` (P,) the effects (default: neutral),
     ``climb_angle`` rad (for an aircraft without an engine it is an unknown of the trim), ``altitude`` m (default: that
     of the reference density), ``heading`` rad. With fewer than three controls the sideslip is free. Raises InputError
-    where there is no such trim, naming the unknowns at their limits.
+    where there is no such trim, naming the unknowns at their limits, and for an aircraft without surfaces.
     """
+    if not simulator.aircraft.controls:
+        raise InputError(f"aircraft {simulator.aircraft.name!r}: has no surfaces; the simulator needs at least one")
     reference = simulator.aircraft.reference
     speed = reference.airspeed if airspeed is None else airspeed
     least, greatest = AIRSPEEDS

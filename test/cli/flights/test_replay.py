@@ -404,3 +404,15 @@ def test_a_reading_that_stands_still_is_warned_of(tmp_path):
     with pytest.warns(InputWarning, match=r"still: sideslip: no change for 10 s.*publish NaN for a flow angle"):
         found = replay(load(tmp_path / "still", "cdrw"), judge_faults=False)
     assert {d.status for d in found.final.derivatives.values()} == {"stale input"}
+
+
+def test_an_imu_that_is_interrupted_every_second_is_warned_of(tmp_path):
+    """Truth: a quarter of every second is missing, and nothing can be estimated from what is left."""
+    whole = read_streams(Path(__file__).resolve().parents[3] / "bags" / "cdrw_multistep")
+    kept = (whole.imu.arrival.stamp_ns - whole.imu.arrival.stamp_ns[0]) % 1_000_000_000 >= 250_000_000
+    arrival = Arrival(*(getattr(whole.imu.arrival, name)[kept] for name in ("stamp_ns", "log_ns", "order")))
+    imu = replace(whole.imu, arrival=arrival, values=whole.imu.values[kept], attitude=whole.imu.attitude[kept])
+    write_streams(tmp_path / "holed", replace(whole, imu=imu))
+    with pytest.warns(InputWarning, match=r"holed: \d+ interruptions of up to 0\.2. s .*set max_gap \(0\.2 s\) to"):
+        found = replay(load(tmp_path / "holed", "cdrw"), judge_faults=False)
+    assert {d.status for d in found.final.derivatives.values()} == {"converging"}

@@ -141,7 +141,7 @@ def test_the_truth_of_a_failure(tmp_path, effects, surfaces, begin, changes):
         (["--effect", "imu_delay:delay=0.1", "--effect", "imu_delay:delay=0.2"], "'imu_delay' is given twice"),
         (["--rate", "0"], "expected"),
         (["--duration", "-1"], "expected 0.1 to 36000 s"),
-        (["--duration", "36000", "--rate", "5000"], "takes about 324 GB of memory at 5000 steps a second, and"),
+        (["--duration", "36000", "--rate", "5000"], "takes about 180 GB of memory at 5000 steps a second, and"),
         (["--aircraft", "nobody"], "nobody"),
     ],
 )

@@ -1,5 +1,6 @@
 """What ``sysid check`` says of a file: gaps, clocks, vanes, faults, the part flown, what moves the aircraft."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -131,6 +132,46 @@ def test_of_a_slow_log_the_rate_and_the_setting_are_told(tmp_path):
     assert row(found, "controls").verdict == "20 Hz needed"
     assert row(found, "airspeed").verdict == "ok"
     assert found.remedies == (found.refusal.remedies[0],)
+
+
+def with_air_data_at(rate: float, later: float = 0.0) -> Streams:
+    """The flight with air data at a ``rate`` (Hz), 1 ms after IMU messages, every other one ``later`` by so many s."""
+
+    def keep(t):
+        wanted = np.arange(0.0, t[-1], 1.0 / rate)
+        wanted[1::2] += later
+        chosen = np.zeros(t.size, bool)
+        chosen[np.searchsorted(t, wanted - 1e-3)] = True
+        return chosen
+
+    thinned = kept("air_data", keep)
+    arrival = replace(thinned.air_data.arrival, stamp_ns=thinned.air_data.arrival.stamp_ns + 1_000_000)
+    return replace(thinned, air_data=replace(thinned.air_data, arrival=arrival))
+
+
+def test_air_data_that_come_too_seldom_to_interpolate_between_are_told_with_the_rate_that_is_needed(tmp_path):
+    """Truth: at 4 Hz all messages are 0.25 s apart, and 0.2 s is the longest gap that is bridged."""
+    found = surveyed(tmp_path, with_air_data_at(4.0))
+    assert row(found, "airspeed").verdict == "over 5 Hz needed"
+    assert row(found, "air density").verdict == "over 5 Hz needed"
+    assert row(found, "IMU").verdict == row(found, "controls").verdict == "ok"
+    assert "air_data comes at 4 Hz, and more than 5 Hz are needed: all of the IMU's messages" in found.sparse
+
+
+def test_air_data_for_which_a_part_is_left_out_are_taken_with_a_remark(tmp_path):
+    """Truth: steps of 0.19 s and 0.21 s take turns, and the IMU messages in the longer ones are left out: 52 %."""
+    found = surveyed(tmp_path, with_air_data_at(5.0, later=0.01))
+    assert row(found, "airspeed").verdict == "over 5 Hz needed"
+    assert found.sparse == ""
+    (remark,) = (remark for remark in found.remarks if "left out" in remark)
+    said = re.search(r"needed: (\d+) % of the IMU's messages are left out", remark)
+    assert float(said[1]) == pytest.approx(52.5, abs=2.5)
+
+
+def test_air_data_that_come_just_often_enough_are_ok(tmp_path):
+    found = surveyed(tmp_path, with_air_data_at(6.25))
+    assert row(found, "airspeed").verdict == "ok"
+    assert (found.sparse, [remark for remark in found.remarks if "left out" in remark]) == ("", [])
 
 
 def test_a_table_is_taken_at_any_rate(tmp_path):

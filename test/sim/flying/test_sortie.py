@@ -1,5 +1,7 @@
 """Flights with autopilot, turbulence and noise, and their recorded messages."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from plain import make_aircraft, three_axes
@@ -199,3 +201,14 @@ def test_bad_recorders():
         FlightSampler(air_data_rate=0.0)
     with pytest.raises(InputError, match="expected commanded or measured"):
         FlightSampler(surfaces="guessed")
+
+
+def test_recording_takes_little_memory_beside_the_flight(fast):
+    """Truth: at 10 Hz there is little to record, and the flight itself is the measure."""
+    sortie = fly_sortie(fast, np.zeros((round(60.0 * RATE) + 1, 4)), SortieConditions(seed=4))
+    outputs = np.asarray(sortie.flight.outputs)
+    tracemalloc.start()
+    FlightSampler(10.0, 10.0, 10.0).record(sortie)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 3.0 * outputs.nbytes

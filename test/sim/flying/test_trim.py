@@ -71,3 +71,9 @@ def test_two_controls_slip_instead(aircraft):
 def test_a_missing_trim_is_explained(simulator, airspeed, pattern):
     with pytest.raises(InputError, match=pattern):
         trim_flight(simulator, airspeed)
+
+
+def test_an_aircraft_without_surfaces_is_said_in_one_line():
+    bare = dataclasses.replace(make_aircraft(), controls={})
+    with pytest.raises(InputError, match=r"^aircraft '.*': has no surfaces; the simulator needs at least one$"):
+        trim_flight(Simulator(bare))

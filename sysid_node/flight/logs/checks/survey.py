@@ -26,6 +26,7 @@ from sysid_node.flight.logs.checks.refusals import (
     refusal_of_streams,
     step_back,
 )
+from sysid_node.flight.logs.checks.spacing import LEAST_RATE, SparseTopic, sparse_topics
 from sysid_node.flight.logs.content import content_of, remapped, say_that_axes_are_known
 from sysid_node.flight.logs.flown import within
 from sysid_node.flight.logs.log_streams import part_remarks
@@ -60,10 +61,13 @@ class SurveyRow:
     gaps: str
     clock: str
     fault: str
+    above: bool = False  # the rate must be above ``needed``, as most of the IMU's messages are left out at this one
 
     @property
     def verdict(self) -> str:
-        """Whether it can be used, in two words."""
+        """Whether it can be used, in a few words."""
+        if self.above:
+            return f"over {self.needed:g} Hz needed"
         if self.rate < 0.93 * self.needed:
             return f"{self.needed:g} Hz needed" if self.rate else "missing"
         return "unusable" if self.fault else "ok"
@@ -73,7 +77,8 @@ class SurveyRow:
 class LogSurvey:
     """What was found in a flight's file.
 
-    ``refusal`` is why no command takes it, and ``two_clocks`` why those do not that align it as a whole. ``incomplete``
+    ``refusal`` is why no command takes it, ``sparse`` why none does with the usual ``max_gap``, and ``two_clocks`` why
+    those do not that align it as a whole. ``incomplete``
     are columns that a table lacks, of which the gap needs those of the longitudinal motion alone, but all their
     samples: ``gap_lacks``. ``needs`` are the keys that the aircraft file must state.
     """
@@ -86,6 +91,7 @@ class LogSurvey:
     excitation: Mapping[str, str]  # by axis
     angles: tuple[str, ...]  # of "alpha" and "beta", those that were measured
     refusal: Refusal
+    sparse: str
     two_clocks: str
     incomplete: str
     gap_lacks: tuple[str, ...]
@@ -106,6 +112,7 @@ class _Signals:
     faults: Mapping[str, str]
     refusal: Refusal
     back: Mapping[str, float] = field(default_factory=dict)  # s by which a topic's clock was set back, by topic
+    sparse: Mapping[str, SparseTopic] = field(default_factory=dict)  # topics that come too seldom, by source
     two_clocks: str = ""
     incomplete: str = ""
     gap_lacks: tuple[str, ...] = ()
@@ -194,9 +201,12 @@ def _of_log(log: AutopilotLog, aircraft: Aircraft | None) -> _Signals:
 def _of_streams(streams: Streams, aircraft: Aircraft | None) -> _Signals:
     refusal, rates = refusal_of_streams(streams), rates_of_streams(streams)
     air, imu, joints = streams.air_data, streams.imu, streams.actuators
-    slow = [found.fault for found in rates.values() if found.fault]
-    if not joints.content:  # then no rate is too low to be taken
+    slow = {topic: found.fault for topic, found in rates.items() if found.fault}
+    sparse = sparse_topics(streams)
+    if not joints.content:  # then no rate is too low to be taken, where values can be interpolated
         rates = {topic: found._replace(needed=0.0) for topic, found in rates.items()}
+    remarks = [] if joints.content else [f"{text} of an autopilot's log" for t, text in slow.items() if t not in sparse]
+    remarks += [found.text for found in sparse.values() if found.left_out < 1.0]
     others = {"vanes": Signal(rates[AIR_DATA].source, air.arrival.stamp_ns, air.values[:, 1:3])}
     if not np.isfinite(air.values[:, 1:3]).any():
         others = {}
@@ -213,11 +223,12 @@ def _of_streams(streams: Streams, aircraft: Aircraft | None) -> _Signals:
         {},
         refusal,
         back,
+        sparse={rates[topic].source: found for topic, found in sparse.items()},
         two_clocks=next(
             (f"the stamps of {t} go back by {s:.1f} s; cut the recording there" for t, s in set_back.items()), ""
         ),
         needs=(FULL_DEFLECTION,) if joints.content == COMMAND_FRACTIONS else (),
-        remarks=tuple(f"{fault} of an autopilot's log" for fault in slow if not joints.content),
+        remarks=tuple(remarks),
     )
 
 
@@ -233,6 +244,7 @@ def _surveyed(name: str, kind: str, signals: _Signals, aircraft: Aircraft | None
         rows.append(
             _row(shown, signal, SampleRate(signal.source, rate_of(signal.stamp_ns), 0.0, ""), _clock(signal), missing)
         )
+    rows = [replace(row, needed=LEAST_RATE, above=True) if row.source in signals.sparse else row for row in rows]
     stamps = signals.imu.stamp_ns
     vanes = signals.others.get("vanes")
     return LogSurvey(
@@ -244,6 +256,7 @@ def _surveyed(name: str, kind: str, signals: _Signals, aircraft: Aircraft | None
         excitation_in_words(signals.imu, signals.airspeed, signals.inputs, aircraft),
         tuple(name for i, name in enumerate(("alpha", "beta")) if vanes is not None and _measured(vanes, i)),
         signals.refusal,
+        "; ".join(found.text for found in signals.sparse.values() if found.left_out == 1.0),
         signals.two_clocks,
         signals.incomplete,
         signals.gap_lacks,

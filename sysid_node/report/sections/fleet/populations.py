@@ -29,6 +29,8 @@ _TAIL_HEIGHT = 17  # pixels a tail in a forest plot
 _MOST_TAILS = 60  # in one forest plot; beyond them those nearest to the mean are left out
 _COLOURS = (VERMILION, BLUE, GREEN, PURPLE)
 _NORMAL_95 = 1.96
+#: Share of its interval's upper end below which a scatter is written as none: the two digits of that end hide it.
+_TOLD = 0.005
 
 
 def context(report: FleetReport) -> dict[str, Any]:
@@ -66,7 +68,9 @@ def _scatter(scatter: Scatter, size: float, name: str) -> str:
     if np.isnan(scatter.value):
         return NONE
     scale, unit = (1.0, "") if name.endswith("_0") else (100.0 / size, "\u202f%")
-    value, lower, upper = (number(scale * x, 2) for x in (scatter.value, scatter.lower, scatter.upper))
+    least = _TOLD * scatter.upper if np.isfinite(scatter.upper) else 0.0
+    found = (x if x >= least else 0.0 for x in (scatter.value, scatter.lower, scatter.upper))
+    value, lower, upper = (number(scale * x, 2) for x in found)
     return f"{value}{unit} ({lower} to {upper})"
 
 
