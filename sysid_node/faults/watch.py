@@ -124,10 +124,10 @@ def present_faults(watch: MessageWatch, now: float) -> list[Fault]:
         for arrived, since in [watch.heard.get(topic, (math.inf, 0.0))]
         if now - arrived > watch.stale_after
     ]
-    estimated = {fault.part for fault in watch.servo_times.faults}
     forces = [watch.state.fault] if watch.state.fault and not silent else []
-    forces = [fault for fault in forces if fault.kind != SLOWER or fault.part not in estimated]
-    return [*silent, *watch.off_command, *watch.servo_times.faults, *watch.limits.faults, *forces]
+    slower = {fault.part for fault in forces if fault.kind == SLOWER}
+    estimated = [fault for fault in watch.servo_times.faults if fault.part not in slower]
+    return [*silent, *watch.off_command, *estimated, *watch.limits.faults, *forces]
 
 
 @dataclass

@@ -1,6 +1,7 @@
 """Messages to faults: what is silent, what does not follow its command; the clock is the test's own."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -8,7 +9,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.faults import watch as watching
 from sysid_node.faults.model.reference_model import IdentifierEstimates, identifier_estimates
 from sysid_node.faults.settings import FaultMonitorSettings
-from sysid_node.faults.types import ARRIVAL, ESTIMATES, POSITION, SILENT, SLOWER, STUCK, Fault
+from sysid_node.faults.types import ARRIVAL, ESTIMATES, FORCES, POSITION, SILENT, SLOWER, STUCK, Fault
 from sysid_node.faults.watch import Announcements, MessageWatch
 from sysid_node.online.types import DerivativeEstimate
 
@@ -101,3 +102,5 @@ def test_a_servo_that_is_slower_after_a_change_is_among_the_faults(watch: Messag
     fault = only(watching.present_faults(watch, 9.0))
     assert (fault.kind, fault.part, fault.source) == (SLOWER, "elevator", ESTIMATES)
     assert fault.size == pytest.approx(0.08)
+    watch.state.fault = replace(fault, source=FORCES, size=0.07)
+    assert only(watching.present_faults(watch, 9.0)).size == 0.07  # once, although it is found in two ways
