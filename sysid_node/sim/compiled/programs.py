@@ -42,9 +42,9 @@ def kept(fixed: int, package: Path = PACKAGE) -> Callable[[Callable[..., _Result
     """A decorator that keeps a compiled program for each value of the first ``fixed`` arguments.
 
     These arguments must be hashable and have the same text in every process (functions count by their names). The other
-    arguments and the result are trees of arrays; a named tuple in the result must be a ``result_type``. Programs cannot
-    be differentiated further. The digest is of the sources of the function's layer below ``package``, and of the layers
-    that it may import.
+    arguments and the result are trees of arrays; a named tuple in the result must be a ``result_type``. A program on
+    the disk cannot be transformed, so that the function itself is used under ``jax.vmap`` and the like. The digest is
+    of the sources of the function's layer below ``package``, and of the layers that it may import.
     """
 
     def decorated(function: Callable[..., _Result]) -> Callable[..., _Result]:
@@ -64,8 +64,16 @@ def kept(fixed: int, package: Path = PACKAGE) -> Callable[[Callable[..., _Result
             result: _Result = found.call(*leaves)
             return result
 
-        compiled: Callable[..., _Result] = jax.jit(program, static_argnums=tuple(range(fixed)))
-        return compiled
+        places = tuple(range(fixed))
+        compiled, plain = jax.jit(program, static_argnums=places), jax.jit(function, static_argnums=places)
+
+        @wraps(function)
+        def chosen(*arguments: Any) -> _Result:
+            transformed = any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(arguments[fixed:]))
+            result: _Result = (plain if transformed else compiled)(*arguments)
+            return result
+
+        return chosen
 
     return decorated
 

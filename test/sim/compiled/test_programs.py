@@ -44,6 +44,17 @@ def test_it_gives_what_the_function_gives_and_is_traced_once_for_all_processes(f
     assert len(list(folder.iterdir())) == 1
 
 
+def test_it_may_be_transformed(folder: Path) -> None:
+    """The function itself is used then, as nothing from the disk can be."""
+    program = traced([])
+    many = jnp.stack([X, 2.0 * X])
+    program("many", {"x": X})
+    sines, _ = jax.vmap(lambda x: program("many", {"x": x}))(many)
+    np.testing.assert_allclose(sines, jnp.sin(many), rtol=1e-15)
+    slopes = jax.jacfwd(lambda x: program("many", {"x": x})[0])(X)
+    np.testing.assert_allclose(slopes.diagonal(), jnp.cos(X), rtol=1e-15)
+
+
 def test_other_fixed_arguments_shapes_or_sources_are_other_programs(folder: Path, tmp_path: Path) -> None:
     times: list[str] = []
     program = traced(times)
