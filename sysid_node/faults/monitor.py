@@ -172,7 +172,8 @@ def _explained(terms: Terms, last: Sequence[Block]) -> NDArray[np.bool_]:
 
     A servo's terms enter several coefficients, and are learned where all of these have.
     """
-    outputs, regressors, behind = (np.array([getattr(b, name) for b in last]) for name in Block._fields[1:4])
+    names = "outputs", "regressors", "behind"
+    outputs, regressors, behind = (np.array([getattr(block, name) for block in last]) for name in names)
     found = np.zeros(len(terms.names), dtype=bool)
     for output in terms.coefficients:
         mine = terms.output == output

@@ -39,8 +39,8 @@ from sysid_node.online.types import SAMPLE_COLUMNS
 Array = NDArray[np.float64]
 
 LIMITS = 1.25 ** np.arange(0, 13)  # rad/s, from 1 to 14.6
-#: Time constant (s), and which of the lags before it each one follows; none: the command. Their sum is a servo.
-LAGS = ((0.0, None), (0.02, None), (0.06, None), (0.02, 1), (0.02, 2))
+#: Time constant (s), and which of the lags before it each one follows; none: the command. Their sum is a servo without a limit.
+UNLIMITED = ((0.0, None), (0.02, None), (0.06, None), (0.02, 1), (0.02, 2))
 SERVO = 1  # of these, before the limit
 MEMORY = 120.0  # s, time constant with which blocks are forgotten
 SURE = 15.0  # log likelihood ratio above which a limit is reported, and
@@ -116,7 +116,7 @@ def init(aircraft: Aircraft, terms: Terms) -> RateLimits:
         output = int(terms.output[main])
         others = terms.column[(terms.output == output) & (np.arange(terms.output.size) != main)]
         controls.append(_Control(name, place, output, others, servo.rate_limit))
-    m, J, K = len(aircraft.controls), len(LAGS), LIMITS.size
+    m, J, K = len(aircraft.controls), len(UNLIMITED), LIMITS.size
     rows: list[deque[Array]] = [deque(maxlen=2) for _ in controls]
     grams = [np.zeros((n, n)) for n in (1 + c.others.size + J + K for c in controls)]
     servos = _Servos(m, np.zeros((m, K)), np.zeros((m, K)))
@@ -131,16 +131,16 @@ def move(state: RateLimits, time: float, sample: Sequence[float]) -> None:
         return
     step, servos.time = time - servos.time, time
     if not servos.commands or not 0.0 < step < PERIOD:
-        servos.commands, servos.lagged = commands, [[u] * len(LAGS) for u in commands]
-        servos.areas = [[0.0] * len(LAGS) for _ in commands]
+        servos.commands, servos.lagged = commands, [[u] * len(UNLIMITED) for u in commands]
+        servos.areas = [[0.0] * len(UNLIMITED) for _ in commands]
         servos.beyond[:], servos.area_beyond[:], servos.limiting = 0.0, 0.0, False
         return
-    decays = [math.exp(-step / lag) if lag else 0.0 for lag, _ in LAGS]
+    decays = [math.exp(-step / lag) if lag else 0.0 for lag, _ in UNLIMITED]
     before = [lagged[SERVO] for lagged in servos.lagged]
     for i, (earlier, now) in enumerate(zip(servos.commands, commands, strict=True)):
         lagged, areas = servos.lagged[i], servos.areas[i]
         means: list[float] = []
-        for j, ((_, source), decay) in enumerate(zip(LAGS, decays, strict=True)):
+        for j, ((_, source), decay) in enumerate(zip(UNLIMITED, decays, strict=True)):
             aim = 0.5 * (earlier + now) if source is None else means[source]  # straight lines between samples
             after = aim + (lagged[j] - aim) * decay if decay else now
             means.append(0.5 * (lagged[j] + after))
@@ -166,7 +166,10 @@ def take(state: RateLimits, block: Block, whitening: Array) -> None:
     k, servos = block.regressors[OFFSET], state.servos
     if servos.commands:
         means, beyond = np.array(servos.areas) / PERIOD, servos.area_beyond / PERIOD
-        servos.areas, servos.area_beyond = [[0.0] * len(LAGS) for _ in servos.commands], np.zeros_like(servos.beyond)
+        servos.areas, servos.area_beyond = (
+            [[0.0] * len(UNLIMITED) for _ in servos.commands],
+            np.zeros_like(servos.beyond),
+        )
     if not servos.commands or not block.follows:
         for earlier in state.rows:
             earlier.clear()
@@ -218,7 +221,7 @@ def _compare(state: RateLimits, i: int, now: float) -> None:
 
 def _ratios(gram: Array, others: int, weight: float) -> tuple[Array, Array]:
     """(K,) log likelihood ratios of the limits, and (K,) the free factor over the surface's effect."""
-    P = others + len(LAGS)
+    P = others + len(UNLIMITED)
     scale = np.sqrt(np.maximum(gram.diagonal(), 1e-300))
     unit = gram / (scale[:, None] * scale)
     ratios, factors = np.zeros(LIMITS.size), np.zeros(LIMITS.size)
