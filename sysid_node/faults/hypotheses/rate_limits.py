@@ -39,7 +39,8 @@ from sysid_node.online.types import SAMPLE_COLUMNS
 Array = NDArray[np.float64]
 
 LIMITS = 1.25 ** np.arange(0, 13)  # rad/s, from 1 to 14.6
-#: Time constant (s), and which of the lags before it each one follows; none: the command. Their sum is a servo without a limit.
+#: Time constant (s), and which of the lags before it each one follows; none: the command. A sum of them is a servo
+#: without a limit.
 UNLIMITED = ((0.0, None), (0.02, None), (0.06, None), (0.02, 1), (0.02, 2))
 SERVO = 1  # of these, before the limit
 MEMORY = 120.0  # s, time constant with which blocks are forgotten
