@@ -226,14 +226,14 @@ def test_estimates_that_are_ripe_as_soon_as_it_judges() -> None:
     assert state.reference.values[state.terms.names.index("CL_alpha")] == 3.02
 
 
-def commanded(seed: int, lateness: float) -> tuple[MonitorState, Maker]:
+def commanded(seed: int, lateness: float, error: float = 0.006) -> tuple[MonitorState, Maker]:
     """A monitor and a maker of flights whose elevator is commanded, after ``ONSET`` s of flight without a fault.
 
-    The identifier says that its servo is late by 0.03 +- 0.006 s; it is late by ``lateness`` s.
+    The identifier says that its servo is late by 0.03 s with this standard ``error`` (s); it is late by ``lateness`` s.
     """
     state, maker = monitored(seed)
     maker.lateness["elevator"] = lateness
-    known = {"elevator": IdentifierEstimate(0.03, 0.006, True)}
+    known = {"elevator": IdentifierEstimate(0.03, error, True)}
     monitor.receive_estimates(state, 1.0, IdentifierEstimates({}, known, False))
     assert fly(state, maker, ONSET) is None
     return state, maker
@@ -259,7 +259,7 @@ def test_a_servo_that_becomes_faster_is_not_slower() -> None:
 
 def test_a_servo_s_error_within_what_is_not_known_of_it_is_no_fault() -> None:
     """Two standard errors; what is learned of it in flight stands from then on."""
-    state, maker = commanded(23, 0.042)
+    state, maker = commanded(23, 0.11, 0.04)
     assert fly(state, maker, 20.0) is None
 
 
