@@ -14,7 +14,7 @@ from sysid_node.aircraft.model import Derivative
 from sysid_node.api.compiled_programs import release_compiled_programs
 from sysid_node.api.data_frames import data_frame
 from sysid_node.api.flight_file import FlightFile, read_alike
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, noted_warnings
 from sysid_node.flight.commanded import CARRIED
 from sysid_node.gap.correction import corrected_aircraft
 from sysid_node.gap.diagnose import Diagnosis
@@ -41,6 +41,7 @@ class GapDiagnosis:
 
     diagnosis: Diagnosis
     flown: InSimulator | None = None  # what the correction does in the user's simulator
+    warnings: tuple[str, ...] = ()  # about the flights, as they were given
 
     @property
     def verdict(self) -> str:
@@ -87,7 +88,7 @@ class GapDiagnosis:
 
     def write(self, folder: Path) -> None:
         """Write what ``sysid gap`` writes into a folder that holds nothing else. Raises InputError."""
-        write_gap(folder, self.diagnosis, self.flown)
+        write_gap(folder, self.diagnosis, self.flown, self.warnings)
 
     def save(self, folder: str | Path, *, force: bool = False) -> Path:
         """Write what ``sysid gap`` writes; returns the path of the report.
@@ -139,21 +140,23 @@ def diagnose(
         raise InputError(f"actuators = {actuators!r}: expected one of {', '.join(CARRIED)}")
     aircraft = flights[0].aircraft
     theirs = None if simulator is None else user_simulator(simulator, aircraft)
-    real, of_simulator = (
-        read_alike(
-            group,
-            actuators,
-            lambda f, carried: load_gap_flight(f.path, aircraft, f.topics, f.body_frame, carried),
-            lambda flight: flight.record.commanded,
+    noted: list[str] = []
+    with noted_warnings(noted):
+        real, of_simulator = (
+            read_alike(
+                group,
+                actuators,
+                lambda f, carried: load_gap_flight(f.path, aircraft, f.topics, f.body_frame, carried),
+                lambda flight: flight.record.commanded,
+            )
+            for group in ([*flights, *holdout], list(simulated))
         )
-        for group in ([*flights, *holdout], list(simulated))
-    )
     fitted, held_out = real[: len(flights)], real[len(flights) :]
     keep = None if resume is None else Path(resume)
     release_compiled_programs()
     report = progress or (lambda share, doing: None)
     found = diagnose_flights(aircraft, fitted, held_out, report, keep=keep, simulated=of_simulator)
     if theirs is None:
-        return GapDiagnosis(found)
+        return GapDiagnosis(found, warnings=tuple(noted))
     report(0.99, f"the held-out commands in {theirs.label}")
-    return GapDiagnosis(found, fly_in(theirs, found))
+    return GapDiagnosis(found, fly_in(theirs, found), tuple(noted))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sysid_node.aircraft.model import Aircraft
@@ -13,7 +13,7 @@ from sysid_node.api.flight_file import FlightFile, read_alike
 from sysid_node.batch.identify import Identification, refuse_unused
 from sysid_node.batch.identify import identify as identify_records
 from sysid_node.batch.settings import BatchSettings
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, noted_warnings
 from sysid_node.flight.truth import read_truth
 from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.files.runs.batch_tables import write_batch_tables
@@ -70,17 +70,20 @@ def identify(
     refuse_unused(method, settings or {})
     tell = progress or (lambda share, doing: None)
     tell(0.0, "reading the flights")
-    every = read_alike(
-        [*flights, *holdout],
-        chosen.actuators,
-        lambda flight, carried: flight.aligned(chosen.max_gap, carried),
-        lambda record: record.commanded,
-    )
-    records, held_out = every[: len(flights)], every[len(flights) :]
-    tell(0.2, method.replace("_", " "))
-    release_compiled_programs()
-    aircraft = flights[0].aircraft
-    found = identify_records(method, aircraft, records, chosen, held_out)
+    noted: list[str] = []
+    with noted_warnings(noted):
+        every = read_alike(
+            [*flights, *holdout],
+            chosen.actuators,
+            lambda flight, carried: flight.aligned(chosen.max_gap, carried),
+            lambda record: record.commanded,
+        )
+        records, held_out = every[: len(flights)], every[len(flights) :]
+        tell(0.2, method.replace("_", " "))
+        release_compiled_programs()
+        aircraft = flights[0].aircraft
+        found = identify_records(method, aircraft, records, chosen, held_out)
     tell(0.9, "spectra")
     result = identification_result(aircraft, records, found, chosen, read_truth(flights[0].path))
+    result = replace(result, remarks=[*noted, *result.remarks])
     return BatchIdentification(result, found, aircraft)

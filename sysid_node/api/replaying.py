@@ -16,7 +16,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.stated_effects import as_estimated, not_taken_in_words
 from sysid_node.api.estimated_run import EstimatedRun
 from sysid_node.api.flight_file import FlightFile
-from sysid_node.errors import InputError, InputWarning
+from sysid_node.errors import InputError, InputWarning, noted_warnings
 from sysid_node.faults.model.reference_model import identifier_estimates
 from sysid_node.faults.recorded_flight import FaultVerdict, RecordedEstimates, RecordedMonitor
 from sysid_node.faults.settings import FaultMonitorSettings as FaultSettings
@@ -79,6 +79,7 @@ class Replay(EstimatedRun):
     truth: Truth  # empty where it is not known
     covariance: EstimateCovariance | None  # of ``final``; None where nothing was estimated
     faults: FaultVerdict | None = None  # None: nothing was judged
+    warnings: tuple[str, ...] = ()  # about the flight, as they were given
 
     @cached_property
     def run(self) -> RunResult:  # type: ignore[override]  # computed when it is first needed
@@ -98,7 +99,7 @@ class Replay(EstimatedRun):
             truth_since=self.truth.since,
             faults=self.faults,
             commanded=commanded,
-            remarks=[*flow_angle_filter.remarks(self.flow), *filter(None, said)],
+            remarks=[*self.warnings, *flow_angle_filter.remarks(self.flow), *filter(None, said)],
         )
         publishing = {"publish_rate": self.publish_rate, "actuators_carry": "commands" if commanded else "positions"}
         return replace(result, settings={**result.settings, **publishing})
@@ -152,11 +153,14 @@ def replay(
     chosen, publish_rate = replay_settings(settings or {})
     truth = truth_at_end(flight.path)
     tell: Progress = progress or (lambda share, doing: None)
-    with flight_pieces(flight.path, flight.aircraft, flight.topics, flight.body_frame, at_once) as found:
+    noted: list[str] = []
+    reading = flight_pieces(flight.path, flight.aircraft, flight.topics, flight.body_frame, at_once)
+    with noted_warnings(noted), reading as found:
         running = _Run(flight.aircraft, chosen, publish_rate, found, judge_faults, tell)
         for piece in found.pieces:
             running.take(piece)
-    return running.result(truth)
+        result = running.result(truth)
+    return replace(result, warnings=tuple(noted))
 
 
 class _Run:

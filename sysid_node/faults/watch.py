@@ -29,7 +29,7 @@ from sysid_node.faults.state import MonitorState
 from sysid_node.faults.types import ARRIVAL, SILENT, SLOWER, Fault
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
-from sysid_node.online.alignment import streaming as intake
+from sysid_node.online.alignment import streaming
 from sysid_node.online.alignment.streaming import AlignedSample, AlignmentState
 
 PERIOD = 0.1  # s between checks whether to report
@@ -44,7 +44,7 @@ class MessageWatch:
 
     state: MonitorState
     servos: ServoCheckState
-    intake: AlignmentState
+    alignment: AlignmentState
     limits: RateLimits
     stale_after: float  # s
     now: float = 0.0  # s, of the last sample
@@ -63,7 +63,7 @@ class MessageWatch:
 def init(aircraft: Aircraft, settings: FaultMonitorSettings, stale_after: float) -> MessageWatch:
     """A monitor before the first message. A topic that falls silent for ``stale_after`` s is a fault."""
     aircraft = as_estimated(aircraft)
-    taken = intake.init(aircraft, blocks.MOST_GAP)
+    taken = streaming.init(aircraft, blocks.MOST_GAP)
     forces, positions = monitor.init(aircraft, settings), servos.init(aircraft, settings)
     limits = rate_limits.init(aircraft, forces.terms)
     return MessageWatch(forces, positions, taken, limits, stale_after)
@@ -72,13 +72,13 @@ def init(aircraft: Aircraft, settings: FaultMonitorSettings, stale_after: float)
 def on_imu(watch: MessageWatch, arrived: float, stamp_ns: int, values: tuple[float, ...]) -> None:
     """Take an IMU message: specific force (m/s^2) and rates (rad/s), FRD."""
     watch.heard[IMU] = (arrived, watch.now)
-    _take(watch, intake.on_imu(watch.intake, stamp_ns, values))
+    _take(watch, streaming.on_imu(watch.alignment, stamp_ns, values))
 
 
 def on_air_data(watch: MessageWatch, arrived: float, stamp_ns: int, values: tuple[float, ...]) -> None:
     """Take an air data message: true airspeed (m/s), flow angles (rad), air density (kg/m^3)."""
     watch.heard[AIR_DATA] = (arrived, watch.now)
-    _take(watch, intake.on_air_data(watch.intake, stamp_ns, values))
+    _take(watch, streaming.on_air_data(watch.alignment, stamp_ns, values))
 
 
 def on_actuators(
@@ -86,17 +86,17 @@ def on_actuators(
 ) -> None:
     """Take joint positions: rad, throttle 0..1 or N."""
     watch.heard[ACTUATORS] = (arrived, watch.now)
-    controls = _controls(watch.intake.actuation, names, positions)
-    if controls and watch.intake.imu.bases:
-        watch.moved = _time_of(watch.intake, stamp_ns)
+    controls = _controls(watch.alignment.actuation, names, positions)
+    if controls and watch.alignment.imu.bases:
+        watch.moved = _time_of(watch.alignment, stamp_ns)
         watch.off_command = servos.position(watch.servos, watch.moved, controls)
-    _take(watch, intake.on_actuators(watch.intake, stamp_ns, names, positions))
+    _take(watch, streaming.on_actuators(watch.alignment, stamp_ns, names, positions))
 
 
 def on_command(watch: MessageWatch, stamp_ns: int, names: Sequence[str], positions: Sequence[float]) -> None:
     """Take a command to the joints; without a stamp, it has the time of the last positions."""
-    controls = _controls(watch.intake.actuation, names, positions)
-    moment = _time_of(watch.intake, stamp_ns) if stamp_ns and watch.intake.imu.bases else watch.moved
+    controls = _controls(watch.alignment.actuation, names, positions)
+    moment = _time_of(watch.alignment, stamp_ns) if stamp_ns and watch.alignment.imu.bases else watch.moved
     if controls and math.isfinite(moment):
         servos.command(watch.servos, moment, controls)
 
@@ -148,7 +148,7 @@ class Announcements:
 
 def _take(watch: MessageWatch, samples: Sequence[AlignedSample]) -> None:
     for moment, sample, _ in samples:
-        watch.now, watch.stamp_ns = moment, intake.stamp_of(watch.intake, moment)
+        watch.now, watch.stamp_ns = moment, streaming.stamp_of(watch.alignment, moment)
         count = watch.state.history.count
         rate_limits.move(watch.limits, moment, sample)
         monitor.update(watch.state, moment, sample)

@@ -33,7 +33,8 @@ def test_the_gap_closes_on_flight_held_out(lagging) -> None:
 def test_its_report_is_drawn_and_fits_every_width(lagging, tmp_path, browse, fit_everywhere) -> None:
     report = tmp_path / "gap" / "report.html"
     report.parent.mkdir()
-    write_gap_report(report, lagging)
+    write_gap_report(report, lagging, warnings=["flight: 3 of 4 clocks agree"])
+    assert "<li>flight: 3 of 4 clocks agree</li>" in report.read_text()
     page = browse(report)
     assert page.complaints == []
     assert page.drawn == page.plots > len(lagging.simulation_gap.per_channel)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -15,6 +16,7 @@ from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.frames import BodyFrame
+from sysid_node.flight.live.interruptions import Interruptions
 from sysid_node.flight.live.mean_force import MeanForce
 from sysid_node.flight.live.mean_lift import MeanLift
 from sysid_node.flight.logs.checks.survey import FULL_DEFLECTION, OUTPUTS, LogSurvey
@@ -81,8 +83,9 @@ def refusals_tried(
 def _refusal(path: Path, read: Callable[[], object]) -> str:
     """Why a reader refuses the flight, without the file's name; empty where it does not."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", InputWarning)  # the survey has told them, but for two
-        warnings.filterwarnings("always", ".*mean (specific force|lift|airspeed)", InputWarning)
+        warnings.simplefilter("ignore", InputWarning)  # the survey has told them, but for these
+        for told in (".*mean (specific force|lift|airspeed)", ".*interruptions of up to"):
+            warnings.filterwarnings("always", told, InputWarning)
         try:
             read()
         except InputError as error:
@@ -105,20 +108,24 @@ def _replayed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame)
         alignment = None
         spans: dict[str, tuple[float, float]] = {}
         names: tuple[str, ...] = ()
-        force, lift = MeanForce(), MeanLift(aircraft)
-        times: list[float] = []
+        force, lift, interruptions = MeanForce(), MeanLift(aircraft), Interruptions()
+        began = last = math.nan
         for piece in flight.pieces:
             names, spans = piece.streams.actuators.names, joined_spans(spans, stamp_spans(piece.streams))
             alignment = alignment or PieceAlignment(aircraft, max_gap, carried_by(piece.streams, setting))
             aligned = alignment.take(piece.streams, last=piece.last)
-            times += [float(aligned.time[0]), float(aligned.time[-1])] if aligned.time.size else []
+            if aligned.time.size:
+                interruptions.add_samples(last, aligned.time, max_gap)
+                began, last = float(aligned.time[0]) if math.isnan(began) else began, float(aligned.time[-1])
             force.add(aligned.time, aligned.samples[:, AZ])
             lift.add(aligned.time, *aligned.samples[:, LIFT].T)
         if force.count:
             force.check(flight.name)
             lift.check(flight.name)
-            if times[-1] - times[0] < FIRST_ESTIMATE:
-                raise InputError(too_short_to_replay(flight.name, times[-1] - times[0]))
+            if last - began < FIRST_ESTIMATE:
+                raise InputError(too_short_to_replay(flight.name, last - began))
+            if broken := interruptions.fault(last, max_gap):
+                warnings.warn(f"{flight.name}: {broken}", InputWarning, stacklevel=2)
             return
         Actuation.of(aircraft).require(names, flight.name)
         raise InputError(why_nothing_aligned(flight.name, spans, alignment.rejected if alignment else {}))

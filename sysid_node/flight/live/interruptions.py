@@ -11,6 +11,10 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from sysid_node.flight.record import Array
+
 LONG = 4.0  # s: where all parts are shorter, few estimates become valid or none
 WINDOW = 20.0  # s that are looked back upon
 LASTED = 10.0  # s of such parts, from which on they are told
@@ -39,6 +43,15 @@ class Interruptions:
             self.longest, self.pause = max(self.longest, before - self.began), max(self.pause, after - before)
         self.began = after
         self._forget(after)
+
+    def add_samples(self, last: float, times: Array, max_gap: float) -> None:
+        """Samples (N,) in order, of which those more than ``max_gap`` apart are interrupted.
+
+        ``last``: the last sample before these, NaN where these are the first.
+        """
+        every = np.concatenate([[last], times])
+        for i in np.flatnonzero(~(np.diff(every) <= max_gap)):
+            self.add(None if np.isnan(every[i]) else float(every[i]), float(every[i + 1]))
 
     def _forget(self, now: float) -> None:
         while self.parts and self.parts[0][1] < now - WINDOW:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 from sysid_node.aircraft.dump import dump_aircraft
@@ -26,10 +27,11 @@ SURROGATE = "surrogate.yaml"
 CORRECTED_SIMULATOR = "corrected_simulator"
 
 
-def write_gap(folder: Path, found: Diagnosis, flown: InSimulator | None = None) -> None:
+def write_gap(folder: Path, found: Diagnosis, flown: InSimulator | None = None, warnings: Sequence[str] = ()) -> None:
     """Writes gap.json, the tables, corrected.yaml, effects.txt and report.html. Raises InputError.
 
     ``flown`` is what the correction does in the user's simulator, whose corrected model is written as well.
+    ``warnings`` are those about the flights, for the report.
     """
     content = {**document(found), **({} if flown is None else {"reflown": reflown_content(flown)})}
     try:
@@ -47,6 +49,6 @@ def write_gap(folder: Path, found: Diagnosis, flown: InSimulator | None = None) 
         write_flights(folder / FLIGHTS, found)
         if flown is not None:
             flown.write_model(found, folder / CORRECTED_SIMULATOR)
-        write_gap_report(folder / "report.html", found, flown)
+        write_gap_report(folder / "report.html", found, flown, warnings)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror}); give another folder as --out") from None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,16 @@ from sysid_node.report.sections.gap import candidates, flight, opening, reflown,
 from sysid_node.report.sections.section import Section
 
 
-def write_gap_report(path: Path, found: Diagnosis, flown: InSimulator | None = None) -> None:
-    """Write the page as one HTML file; ``flown`` is what the correction does in the user's simulator."""
+def write_gap_report(
+    path: Path, found: Diagnosis, flown: InSimulator | None = None, warnings: Sequence[str] = ()
+) -> None:
+    """Write the page as one HTML file.
+
+    ``flown`` is what the correction does in the user's simulator; ``warnings`` are those about the flights.
+    """
     title = f"The simulator against the flight: {found.aircraft.name}"
-    sections = list(SECTIONS)
+    first = Section("opening", "", "gap/opening.html.j2", lambda one: opening.opening(one, warnings))
+    sections = [first, *SECTIONS]
     if flown is not None:
         there = Section("reflown", f"Flown in {flown.simulator.label}", "gap/reflown.html.j2", _reflown(flown))
         sections.insert(_AFTER_CHANNELS, there)
@@ -32,7 +38,6 @@ _AFTER_CHANNELS = 2
 
 
 SECTIONS: tuple[Section[Diagnosis], ...] = (
-    Section("opening", "", "gap/opening.html.j2", opening.opening),
     Section("channels", "Error before and after the correction", "gap/channels.html.j2", opening.channels),
     Section("where", "Where the gap lies", "gap/where.html.j2", waterfall.where),
     Section("flight", "Measured and simulated", "gap/flight.html.j2", flight.flight),

@@ -2,13 +2,17 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.api import identify, load
 from sysid_node.batch.identify import METHODS
 from sysid_node.cli.main import main
+from sysid_node.errors import InputWarning
 from sysid_node.flight.csv import write_csv
 from sysid_node.flight.logs.opening import load_flight_record
 
@@ -51,6 +55,15 @@ def test_the_summary_keeps_the_contract(summary):
     assert summary["fits"]["Cm"]["r_squared"] > 0.98
     assert set(summary["holdout"]["cdrw_random"]) == {"CL", "CD", "CY", "Cl", "Cm", "Cn"}
     assert summary["settings"]["stepwise"] is True
+
+
+def test_what_is_odd_about_a_flight_is_in_the_report_as_well(tmp_path):
+    """Truth: a mass in hundreds of grams, with which the mean lift is not that of the flight."""
+    aircraft = load_aircraft("cdrw")
+    (tmp_path / "heavy.yaml").write_text(dump_aircraft(replace(aircraft, mass=10.0 * aircraft.mass)))
+    with pytest.warns(InputWarning, match="mean lift coefficient") as told:
+        found = identify(load(BAGS / "cdrw_random", tmp_path / "heavy.yaml"), "equation_error")
+    assert found.run.remarks[0] == str(told[0].message)
 
 
 def test_the_bundled_flights_truth_is_found(summary):

@@ -16,6 +16,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import LookupTable, UncertainValue
 from sysid_node.api import load, replay
 from sysid_node.api.replaying import replay_settings
+from sysid_node.cli.flights.verdicts import refusals_tried
 from sysid_node.cli.main import main
 from sysid_node.cli.shared.options import settings_of
 from sysid_node.errors import InputError, InputWarning
@@ -416,3 +417,7 @@ def test_an_imu_that_is_interrupted_every_second_is_warned_of(tmp_path):
     with pytest.warns(InputWarning, match=r"holed: \d+ interruptions of up to 0\.2. s .*set max_gap \(0\.2 s\) to"):
         found = replay(load(tmp_path / "holed", "cdrw"), judge_faults=False)
     assert {d.status for d in found.final.derivatives.values()} == {"converging"}
+    assert len(found.warnings) == 1 and found.warnings[0] in found.run.remarks
+    counted = found.warnings[0].partition(" s in ")[0]
+    with pytest.warns(InputWarning, match=counted):  # before replaying
+        assert refusals_tried(tmp_path / "holed", load_aircraft("cdrw"))["replay"] == ""

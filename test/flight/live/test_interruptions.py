@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from sysid_node.flight.live.interruptions import Interruptions
@@ -25,6 +26,18 @@ def test_short_parts_are_told_with_their_length_and_what_to_do() -> None:
     assert text.startswith("29 interruptions of up to 0.25 s in 30 s, and no longer part without one than 0.8 s")
     assert text.endswith("set max_gap (0.2 s) to more than 0.25 s")
     assert "20 interruptions of up to 0.25 s" in interruptions.recent_fault(last, MAX_GAP)
+
+
+def test_samples_at_once_are_taken_as_one_at_a_time() -> None:
+    """The samples of the same parts, in pieces, of which one begins with an interruption and one is empty."""
+    begins = np.arange(30) * 1.0
+    times = (begins[:, None] + np.linspace(0.0, 0.75, 16)).ravel()
+    together = Interruptions()
+    for piece in np.split(times, [160, 160, 200]):
+        before = times[np.searchsorted(times, piece[0]) - 1] if piece.size and piece[0] > 0.0 else math.nan
+        together.add_samples(float(before), piece, MAX_GAP)
+    alone, last = came([0.75] * 30)
+    assert together.fault(last, MAX_GAP) == alone.fault(last, MAX_GAP) != ""
 
 
 def test_over_long_interruptions_nothing_should_be_interpolated() -> None:

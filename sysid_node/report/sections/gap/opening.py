@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from sysid_node.gap.diagnose import Diagnosis
@@ -18,8 +18,8 @@ from sysid_node.sim.signals.low_pass import CORNER
 _STAGE_WORDS = ("Gap before", "Within tolerances", "Gap after", "Noise floor")
 
 
-def opening(found: Diagnosis) -> Mapping[str, Any]:
-    """The paragraph and the figures beside it."""
+def opening(found: Diagnosis, warnings: Sequence[str] = ()) -> Mapping[str, Any]:
+    """The paragraph, the warnings about the flights, and the figures beside it."""
     gap, model = found.size, found.models[0]
     low, high = gap.ci95
     length = f"{length_of(found.models[0]):g}" if found.simulation_gap else f"{found.models[0].windows.length:.2g}"
@@ -31,6 +31,7 @@ def opening(found: Diagnosis) -> Mapping[str, Any]:
     ]
     return {
         "text": paragraph(found),
+        "warnings": warnings,
         "facts": facts,
         "next_flight": found.next_flight,
         "short": bool(found.simulation_gap),
