@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from sysid_node.api.flight_file import FlightFile, read_alike
 from sysid_node.batch.identify import Identification, refuse_unused
 from sysid_node.batch.identify import identify as identify_records
 from sysid_node.batch.settings import BatchSettings
-from sysid_node.errors import InputError, noted_warnings
+from sysid_node.errors import InputError, InputWarning, noted_warnings
 from sysid_node.flight.truth import read_truth
 from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.files.runs.batch_tables import write_batch_tables
@@ -83,6 +84,8 @@ def identify(
         release_compiled_programs()
         aircraft = flights[0].aircraft
         found = identify_records(method, aircraft, records, chosen, held_out)
+    if not found.fit.search.converged:
+        warnings.warn(f"{method.replace('_', ' ')}: {found.fit.search.message}", InputWarning, stacklevel=2)
     tell(0.9, "spectra")
     result = identification_result(aircraft, records, found, chosen, read_truth(flights[0].path))
     result = replace(result, remarks=[*noted, *result.remarks])

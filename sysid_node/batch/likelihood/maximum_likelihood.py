@@ -23,7 +23,8 @@ class SearchOptions:
     """The limits of a search: rounds of noise relaxation, and model evaluations within each.
 
     The search has converged once a whole round moves no unknown by more than ``tolerance`` of its standard error.
-    ``early`` limits the evaluations of a round that another will follow; the last round has ``evaluations``.
+    ``early`` limits the evaluations of a round until one of so few moves no unknown; all further rounds have
+    ``evaluations``.
     """
 
     rounds: int = 60
@@ -50,8 +51,8 @@ def maximise_likelihood(problem: LikelihoodProblem, search: SearchOptions) -> tu
         moved = float(np.linalg.norm(problem.jacobian(z, noise) @ (z - previous)))
         if moved < search.tolerance and evaluations == search.evaluations:
             return z, iteration, ""
-        # a round of few evaluations may have found no step at all: a full one confirms the result
-        evaluations = search.evaluations if moved < search.tolerance else search.early
+        # A round of few evaluations may have found no step at all. Where one did, the next would as well.
+        evaluations = search.evaluations if moved < search.tolerance else evaluations
     return (
         z,
         search.rounds,

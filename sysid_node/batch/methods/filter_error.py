@@ -33,7 +33,7 @@ from sysid_node.batch.results.response import ModelResponse
 
 #: The likelihood is flat in the noises, so that the last digits take long; a hundredth of a standard error is enough.
 #: Early rounds are short, because a full search with the first, wrong, noise may end at a local maximum.
-FILTER_SEARCH = SearchOptions(tolerance=1e-2, early=3)
+FILTER_SEARCH = SearchOptions(rounds=100, tolerance=1e-2, early=3)
 
 
 def filter_error(

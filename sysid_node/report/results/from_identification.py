@@ -38,7 +38,7 @@ def identification_result(
     fit, first = found.fit, records[0]
     commanded = any(record.commanded for record in records)
     carried = carried_in_words(aircraft, settings.actuators, commanded)
-    trusted = "ok" if fit.search.converged else f"not converged: {fit.search.message}"
+    trusted = "ok" if fit.search.converged else "not converged"
     derivatives = {
         name: _derivative(name, fit.estimates.get(name), trusted, fit.remarks) for name in aircraft.derivatives
     }

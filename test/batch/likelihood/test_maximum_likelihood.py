@@ -21,6 +21,14 @@ def test_a_linear_problem_is_solved():
     assert np.abs(stationary(problem, z)).max() < 1e-2
 
 
+def test_one_round_at_most_is_lost_to_few_evaluations():
+    """With one evaluation no round finds a step; else every second round of a slow search would be in vain."""
+    _, whole, _ = maximise_likelihood(LineProblem(), SearchOptions())
+    _, rounds, complaint = maximise_likelihood(LineProblem(), SearchOptions(early=1))
+    assert not complaint
+    assert rounds == whole + 1 > 3
+
+
 def test_a_search_cut_short_says_so():
     _, rounds, complaint = maximise_likelihood(LineProblem(), SearchOptions(rounds=1))
     assert rounds == 1
