@@ -109,6 +109,7 @@ MISTAKES = [
     ("{joint: rudder, scale: -1.0}", "{joint: throttle}", ("controls.rudder: joint 'throttle' is already",)),
     (", symbol: df", "", ("controls.flap: not one of elevator, aileron, rudder, throttle", "needs a symbol")),
     ("  rudder: ", "  ruder: ", ("controls.ruder: not one of", "did you mean 'rudder'?")),
+    ("  aileron: ", "  da: ", ("controls.da: not one of", "did you mean 'aileron'?")),
     ("controls:\n", MANY_CONTROLS, ("f.yaml:", "controls: 2004 controls, expected at most 32")),
     ("symbol: df", "symbol: alpha", ("controls.flap.symbol: got 'alpha'",)),
     ("symbol: df", "symbol: da", ("controls.flap: symbol 'da' is already that of 'aileron'",)),

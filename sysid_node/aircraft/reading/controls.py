@@ -57,7 +57,8 @@ def _symbol(name: str, control: DocumentEntry, symbol: DocumentEntry | None) -> 
     if symbol is None:
         if standard is None:
             known = ", ".join((*CONTROL_SYMBOLS, "throttle"))
-            hint = did_you_mean(name, (*CONTROL_SYMBOLS, "throttle"))
+            named = next((control for control, symbol in CONTROL_SYMBOLS.items() if symbol == name), name)
+            hint = did_you_mean(named, (*CONTROL_SYMBOLS, "throttle"))
             raise control.error(f"not one of {known}{hint}; a further control needs a symbol, e.g. symbol: df")
         return standard
     text = symbol.text("a symbol, e.g. df")
