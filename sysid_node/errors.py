@@ -20,12 +20,13 @@ class InputWarning(UserWarning):
 @contextmanager
 def noted_warnings(texts: list[str]) -> Iterator[None]:
     """Add the text of every InputWarning that is given inside to ``texts``, once each; all warnings go on from here."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", InputWarning)
-        try:
+    caught: list[warnings.WarningMessage] = []
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", InputWarning)
             yield
-        finally:
-            noted = [" ".join(str(one.message).split()) for one in caught if issubclass(one.category, InputWarning)]
-            texts.extend(dict.fromkeys(noted))
-    for one in caught:
-        warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
+    finally:
+        noted = [" ".join(str(one.message).split()) for one in caught if issubclass(one.category, InputWarning)]
+        texts.extend(dict.fromkeys(noted))
+        for one in caught:
+            warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)

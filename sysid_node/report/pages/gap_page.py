@@ -21,12 +21,15 @@ def write_gap_report(
     ``flown`` is what the correction does in the user's simulator; ``warnings`` are those about the flights.
     """
     title = f"The simulator against the flight: {found.aircraft.name}"
-    first = Section("opening", "", "gap/opening.html.j2", lambda one: opening.opening(one, warnings))
-    sections = [first, *SECTIONS]
+    sections = [Section("opening", "", "gap/opening.html.j2", _opening(warnings)), *SECTIONS]
     if flown is not None:
         there = Section("reflown", f"Flown in {flown.simulator.label}", "gap/reflown.html.j2", _reflown(flown))
         sections.insert(_AFTER_CHANNELS, there)
     path.write_text(render_page(title, sections, found), encoding="utf-8")
+
+
+def _opening(warnings: Sequence[str]) -> Callable[[Diagnosis], Mapping[str, Any]]:
+    return lambda found: opening.opening(found, warnings)
 
 
 def _reflown(flown: InSimulator) -> Callable[[Diagnosis], Mapping[str, Any]]:
