@@ -25,7 +25,7 @@ def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
             assert isinstance(last, ast.Expr), "a cell ends with what it shows"
             shown.append(eval(compile(ast.Expression(last.value), "notebook", "eval"), names))
     flight, picture, run, estimates, pair, _ = shown
-    assert "6000 samples" in repr(flight)
+    assert "30.0 s, 5998 samples" in repr(flight)
     assert picture.data
     assert len(estimates.data) > 27
     assert "<table>" in run._repr_html_()  # what Jupyter calls
