@@ -31,9 +31,9 @@ _BROWSER_FLAGS = (
 )
 
 
-#: Folders whose tests share compiled programs and costly fixtures. One worker runs all of a folder, so that nothing is
-#: compiled or flown twice; the tests of other folders are distributed by file.
-_TOGETHER = ("test/gap/", "test/batch/", "test/sim/")
+#: Folders, and files that begin alike, whose tests share compiled programs and costly fixtures. One worker runs all of
+#: them, so that nothing is compiled or flown twice; all other tests are distributed by file.
+_TOGETHER = ("test/gap/", "test/batch/", "test/sim/", "test/cli/flights/test_gap")
 
 #: What takes longest. It begins first, so that no worker ends long after the other.
 _FIRST = (

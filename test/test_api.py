@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from short_bags import short_bag
 
 import sysid_node
 from sysid_node import identify, load, replay
@@ -27,15 +28,16 @@ def flight():
 
 
 @pytest.fixture(scope="module")
-def replayed(flight):
+def replayed(tmp_path_factory):
+    flight = load(short_bag("cdrw_multistep", 36.0, tmp_path_factory.mktemp("replayed")), "cdrw")
     return replay(flight, {"publish_rate": 1.0})
 
 
 @pytest.fixture(scope="module")
 def log(flight, tmp_path_factory):
-    """The first 24 s of the flight, as CSV."""
+    """The first 16 s of the flight, as CSV."""
     path = tmp_path_factory.mktemp("log") / "short.csv"
-    write_csv(path, flight.record.between(0.0, 24.0))
+    write_csv(path, flight.record.between(0.0, 16.0))
     return path
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 import sys
@@ -20,6 +21,11 @@ from sysid_node.flight.streams import Streams
 
 ROOT = Path(__file__).resolve().parents[2]
 FORMATS = ("jsbsim", "gazebo", "rosflight")
+_COMMANDS = """
+import json, sys
+from sysid_node.cli.main import main
+sys.exit(any([main(command) for command in json.loads(sys.argv[1])]))
+"""
 CATALOGUE = """path,aircraft,tail,configuration,date,maintenance
 mcap,cdrw,7,camera pod,2026-05-03,
 sqlite3,cdrw,8,,2026-05-04,
@@ -53,18 +59,20 @@ class Seeds:
         shutil.copy(ROOT / "config" / "aircraft" / "cdrw.yaml", folder / "aircraft.yaml")
         (folder / "fleet.csv").write_text(CATALOGUE, encoding="utf-8")
         (folder / "fleet.yaml").write_text(CATALOGUE_YAML, encoding="utf-8")
-        _command("replay", str(folder / "mcap"), "--aircraft", "cdrw", "--out", str(folder / "run"))
-        for form in FORMATS:
-            _command("export", "cdrw", "--format", form, "--out", str(folder / form))
+        _run(
+            ["replay", str(folder / "mcap"), "--aircraft", "cdrw", "--out", str(folder / "run")],
+            *(["export", "cdrw", "--format", form, "--out", str(folder / form)] for form in FORMATS),
+        )
         found = sorted(logs.iterdir()) if logs else []
         return cls(folder, [log for log in found if log.is_file() and log.suffix.lower() != ".md"])
 
 
-def _command(*words: str) -> None:
-    """A command in a process of its own: JAX would start threads here, without which a forked case waits for ever."""
-    done = subprocess.run([sys.executable, "-m", "sysid_node.cli", *words, "--quiet"], cwd=ROOT, check=False)
+def _run(*commands: Sequence[str]) -> None:
+    """Commands, in a process of their own: JAX would start threads here, without which a forked case waits for ever."""
+    words = json.dumps([[*command, "--quiet"] for command in commands])
+    done = subprocess.run([sys.executable, "-c", _COMMANDS, words], cwd=ROOT, check=False)
     if done.returncode:
-        raise RuntimeError(f"sysid {words[0]} of sound input does not end well")
+        raise RuntimeError("a command with sound input does not end well")
 
 
 def beginning(streams: Streams, seconds: float) -> Streams:

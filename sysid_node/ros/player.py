@@ -7,7 +7,7 @@ import importlib
 import struct
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ CLOCK_PERIOD = NANOSECONDS // 100
 ACKNOWLEDGED = Duration(seconds=5)  # the longest wait for subscribers to acknowledge the last messages
 #: Recorded beside the topic ``actuators``, to which alone an identifier listens: nobody waits for listeners of these.
 BESIDE = (COMMANDS, POSITIONS)
+KEPT = 5000  # messages of a topic that are kept for a subscriber that is behind
 SETTLE = 0.3  # s after a subscriber is found, until it receives messages for certain
 
 
@@ -43,18 +44,21 @@ class Player(Node):
             if kind is None:
                 self.get_logger().warning(f"{name} is not played: its type {type_name} is not installed here")
                 continue
-            publisher = self.create_publisher(kind, name, QoSProfile(depth=1000))
+            publisher = self.create_publisher(kind, name, QoSProfile(depth=KEPT))
             first = next(iter(kind.get_fields_and_field_types().values()), "")
             self._topics[name] = publisher, first == "std_msgs/Header"
         self._clock = self.create_publisher(Clock, "/clock", 10) if clock else None
 
-    def await_listeners(self, patience: float) -> None:
-        """Wait up to ``patience`` s until every topic has a subscriber, but those ``BESIDE``; log those without one."""
+    def await_listeners(self, patience: float, topics: Sequence[str] = ()) -> None:
+        """Wait up to ``patience`` s until each of the ``topics`` has a subscriber; log those without one.
+
+        Without any: every topic but those ``BESIDE``.
+        """
         end = time.monotonic() + patience
-        unheard = self._unheard()
+        unheard = self._unheard(topics)
         while unheard and time.monotonic() < end and rclpy.ok():
             time.sleep(0.02)
-            unheard = self._unheard()
+            unheard = self._unheard(topics)
         if unheard:
             self.get_logger().warning(f"nobody listens to {', '.join(unheard)}")
         else:
@@ -84,9 +88,10 @@ class Player(Node):
                 publisher.wait_for_all_acked(ACKNOWLEDGED)
         return count
 
-    def _unheard(self) -> list[str]:
-        waited = ((name, publisher) for name, (publisher, _) in self._topics.items() if name not in BESIDE)
-        return [name for name, publisher in waited if not publisher.get_subscription_count()]
+    def _unheard(self, topics: Sequence[str]) -> list[str]:
+        waited = topics or [name for name in self._topics if name not in BESIDE]
+        publishers = ((name, publisher) for name, (publisher, _) in self._topics.items() if name in waited)
+        return [name for name, publisher in publishers if not publisher.get_subscription_count()]
 
 
 def shift_stamp(raw: bytes, shift: int) -> bytes:
@@ -137,6 +142,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--restamp", action="store_true", help="move all stamps by one constant, to now")
     parser.add_argument("--clock", action="store_true", help="publish /clock, for nodes with use_sim_time")
     parser.add_argument("--wait", type=float, default=5.0, help="longest wait for listeners, s (5)")
+    parser.add_argument("--wait-for", metavar="TOPIC", nargs="+", default=[], help="whose listeners (all topics)")
     return parser
 
 
@@ -147,7 +153,7 @@ def main() -> None:
     def play() -> None:
         with open_bag(options.bag) as bag:
             player = Player({connection.topic: connection.msgtype for connection in bag.connections}, options.clock)
-            player.await_listeners(options.wait)
+            player.await_listeners(options.wait, options.wait_for)
             count = player.play(recorded(bag, options.bag), options.rate, options.restamp)
             player.get_logger().info(f"played {count} messages of {options.bag}")
 

@@ -7,6 +7,7 @@ the commands, and at the end it is said what the positions would have added.
 from __future__ import annotations
 
 import argparse
+import math
 import statistics
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -48,9 +49,9 @@ if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
 
 PUBLISH_RATE = 10.0  # Hz
-AFTERWARDS = 0.2  # s to listen after the flight's end, before its estimates are called stale
 STALE = "stale input"  # status of estimates while nothing comes
 DIAGNOSTICS_PERIOD = 1.2  # s in which /diagnostics sends its last totals
+PATIENCE = 12.0  # s after which messages that the identifier still has not received count as lost
 #: A bag may be played faster than it was flown; no message may be lost on a busy computer.
 RELIABLE = ("reliability:=reliable", "depth:=5000")
 
@@ -166,11 +167,10 @@ def _fly(flight: DemoFlight, aircraft: str, rate: float, out: Path) -> tuple[Fol
         for ours, theirs in flight.topics.items():
             identifier += ["-r", f"{ours}:={theirs}"]
             identifier += [word for how in RELIABLE for word in ("-p", f"qos_overrides.{theirs}.subscription.{how}")]
-        player = [str(flight.bag), "--rate", str(rate), "--wait", "20"]
+        player = [str(flight.bag), "--rate", str(rate), "--wait", "60", "--wait-for", *flight.topics.values()]
         with node_process("identifier", identifier, out) as identifying, node_process("player", player, out) as playing:
             _watch(flight, follower, identifying, playing)
             history = _in_flight(follower.history)
-            follower.listen(DIAGNOSTICS_PERIOD)
     finally:
         follower.close()
         rclpy.try_shutdown()
@@ -196,9 +196,21 @@ def _watch(
         while playing.poll() is None and identifying.poll() is None:
             follower.listen(0.1)
             live.update(_picture(flight, follower, console.width, console.height), refresh=True)
-        follower.listen(AFTERWARDS)
+        _hear_out(flight, follower, identifying)
         live.update(_picture(flight, follower, console.width), refresh=True)
     console.print()
+
+
+def _hear_out(flight: DemoFlight, follower: Follower, identifying: subprocess.Popen[bytes]) -> None:
+    """Listen until the identifier has received all that was played, or receives nothing more.
+
+    On a busy computer it is still behind when the player has finished.
+    """
+    left, waited = math.inf, 0.0
+    while left > 0 and waited < PATIENCE and identifying.poll() is None:
+        follower.listen(DIAGNOSTICS_PERIOD)
+        before, left = left, _lost(flight, follower)
+        waited = 0.0 if left < before else waited + DIAGNOSTICS_PERIOD
 
 
 def _picture(flight: DemoFlight, follower: Follower, width: int, height: int | None = None) -> RenderableType:

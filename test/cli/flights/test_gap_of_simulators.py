@@ -13,8 +13,8 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
 
 SLOW = "actuator_lag:elevator=0.12:aileron=0.03:rudder=0.03"
-STEPS = ("--manoeuvre", "3211:width=0.3:repeat=2", "--duration", "30")
-SMOOTH = ("--manoeuvre", "multisine:length=26", "--duration", "30")
+STEPS = ("--manoeuvre", "3211:width=0.3:repeat=2", "--duration", "24", "--rate", "100")
+SMOOTH = ("--manoeuvre", "multisine:length=20", "--duration", "24", "--rate", "100")
 
 
 @pytest.fixture(scope="module")

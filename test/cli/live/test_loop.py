@@ -24,7 +24,7 @@ def loop(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_it_flies_and_writes_the_report(tmp_path: Path) -> None:
-    done = loop("--seconds", "8", "--out", str(tmp_path))
+    done = loop("--seconds", "6", "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr
     assert "tracking error" in done.stdout
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))

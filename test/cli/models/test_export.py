@@ -2,11 +2,11 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 from xml.etree.ElementTree import fromstring, parse
 
 import pytest
 import yaml
+from short_bags import short_bag
 
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
@@ -19,7 +19,6 @@ from sysid_node.sim.export.rosflight import rosflight_parameters
 from sysid_node.sim.importing.gazebo.read import read_gazebo
 from sysid_node.sim.importing.rosflight import read_rosflight
 
-BAGS = Path(__file__).resolve().parents[3] / "bags"
 SUMMARY = {
     "aircraft": "cdrw",
     "derivatives": {
@@ -50,8 +49,9 @@ def test_a_run_is_exported_with_the_aircraft_that_it_began_with(tmp_path, method
     """As found in use: 3 kg stand in the user's file, whose name is that of a bundled aircraft."""
     known = replace(load_aircraft("cdrw"), mass=3.0)
     (tmp_path / "mine.yaml").write_text(dump_aircraft(known))
-    words = [method, str(BAGS / "cdrw_multistep"), "--aircraft", str(tmp_path / "mine.yaml"), "--quiet"]
-    words += ["--out", str(tmp_path / "run"), *(["--method", "equation_error"] if method == "identify" else [])]
+    words = [method, str(short_bag("cdrw_multistep", 12.0, tmp_path)), "--out", str(tmp_path / "run"), "--quiet"]
+    words += ["--aircraft", str(tmp_path / "mine.yaml")]
+    words += ["--method", "equation_error"] if method == "identify" else []
     assert main(words) == 0
     assert load_aircraft(tmp_path / "run" / "aircraft.yaml") == known
     out = tmp_path / "model.yaml"
