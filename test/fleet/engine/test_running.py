@@ -74,7 +74,7 @@ def test_a_killed_worker_costs_an_attempt_and_a_slow_flight_is_ended(workers: Wo
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line() -> None:
-    with pytest.raises(InputError, match="no scheduler answers"), connected("tcp://127.0.0.1:1"):
+    with pytest.raises(InputError, match="no scheduler answers"), connected("tcp://127.0.0.1:1", 1.0):
         pass
 
 
