@@ -17,7 +17,7 @@ from sysid_node.gap.residuals.residual_model import CHANNELS, ResidualModel
 from sysid_node.sim import Simulator
 
 FIRST = len(CHANNELS) - len(READINGS)
-STEPS_ONCE = ["3211:elevator:start=1", "3211:aileron:start=3.5", "3211:rudder:start=6"]
+STEPS_ONCE = ["3211:elevator:start=2", "3211:aileron:start=8", "3211:rudder:start=14"]
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,7 @@ def test_moment_with_the_rate_of_alpha_is_found_despite_the_vane_noise(aircraft)
 
 def test_a_lag_is_found_despite_the_vanes_noise(aircraft) -> None:
     """Most of the flight is quiet: by the vanes alone derivatives seem smaller there, and the lag makes up for it."""
-    flight = fly(aircraft, {"actuator_lag": {"time_constant": 0.09}}, 3, manoeuvre=STEPS_ONCE, duration=29.9)
+    flight = fly(aircraft, {"actuator_lag": {"time_constant": 0.09}}, 3, manoeuvre=STEPS_ONCE, duration=60.0)
     model = residual_model_of(Simulator(aircraft, 50.0), flight)
     by_vanes = replace(model, inputs=model.inputs._replace(memory=model.inputs.memory._replace(vane=jnp.zeros(()))))
     off = []
