@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -40,9 +41,7 @@ def draw(folder: Path, which: str, seed: int) -> Case:
     random = np.random.default_rng([SETS[which], seed])
     weights = np.array([_WEIGHTS[name] for name in names], float)
     name = str(random.choice(names, p=weights / weights.sum()))
-    flight = FLIGHTS[name]
-    found = _effects(folder, flight, belief(folder, flight))
-    effects = {effect: size for effect, size in found if effect not in flight.cancelled}
+    effects = _effects_of(folder, name)
     effect = str(random.choice(list(effects)))
     return Case(seed, name, effect, _sized(effects[effect], random))
 
@@ -62,6 +61,14 @@ def _sized(size: _Size, random: np.random.Generator) -> dict[str, float]:
     if size.either and random.random() < 0.5:
         value = -value
     return {name: value} | dict(size.always or {})
+
+
+@cache
+def _effects_of(folder: Path, name: str) -> Mapping[str, _Size]:
+    """The effects that can be put into a flight, without those that undo what its record holds."""
+    flight = FLIGHTS[name]
+    found = _effects(folder, flight, belief(folder, flight))
+    return {effect: size for effect, size in found if effect not in flight.cancelled}
 
 
 def _effects(folder: Path, flight: Flight, aircraft: Aircraft) -> Iterator[tuple[str, _Size]]:

@@ -16,17 +16,18 @@ SPEED = 18.0
 NOISE = np.array([0.004, 0.003, 0.05])  # alpha rad, q rad/s, az m/s^2
 
 
+def _derivative(x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
+    (alpha, q), (de,), (Za, Zd, Ma, Mq, Md) = x, u, theta
+    return q + Za * alpha + Zd * de, Ma * alpha + Mq * q + Md * de
+
+
+def _output(x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
+    (alpha, q), (de,) = x, u
+    return alpha, q, SPEED * (theta[0] * alpha + theta[1] * de)
+
+
 def short_period_model(start: dict[str, float] | None = None, **parameter: object) -> StateSpaceModel:
     """Linear short period, outputs alpha, q and the normal acceleration of the path; keywords go to all parameters."""
-
-    def derivative(x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
-        (alpha, q), (de,), (Za, Zd, Ma, Mq, Md) = x, u, theta
-        return q + Za * alpha + Zd * de, Ma * alpha + Mq * q + Md * de
-
-    def output(x: Scalars, u: Scalars, theta: Scalars) -> Scalars:
-        (alpha, q), (de,) = x, u
-        return alpha, q, SPEED * (theta[0] * alpha + theta[1] * de)
-
     values = SHORT_PERIOD | (start or {})
     return StateSpaceModel(
         name="short_period",
@@ -34,8 +35,8 @@ def short_period_model(start: dict[str, float] | None = None, **parameter: objec
         inputs=("de",),
         outputs=("alpha", "q", "az"),
         parameters=tuple(ModelParameter(name, value, **parameter) for name, value in values.items()),  # type: ignore[arg-type]
-        derivative=derivative,
-        output=output,
+        derivative=_derivative,
+        output=_output,
     )
 
 

@@ -41,7 +41,7 @@ def test_every_method_answers_a_held_out_flight(found):
 
 
 def test_filter_error_on_two_states_that_the_others_are_measured_for():
-    settings = dataclasses.replace(QUICK, states=("alpha", "q"), rate=0.0)
+    settings = dataclasses.replace(QUICK, states=("alpha", "q"))
     found = identify("filter_error", KESTREL, [flight(1)], settings, [flight(2, turn=-1)])
     assert found.fit.search.converged
     assert np.abs(scores(found.fit.estimates)).max() < 5.0

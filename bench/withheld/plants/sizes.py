@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -27,7 +28,7 @@ SIZES = {"foamie": Size(0.5, 12.0, 1.2), "transport": Size(17000.0, 130.0, 0.9, 
 
 def sized(name: str) -> Aircraft:
     """The aircraft of a size. It flies level at the lift coefficient of the shape, and has its derivatives."""
-    shape, size = load_aircraft(SHAPE), SIZES[name]
+    shape, size = _shape(), SIZES[name]
     heavier, longer = size.mass / shape.mass, _longer(shape, size)
     geometry, throttle = shape.geometry, shape.throttle
     assert throttle is not None and throttle.max_thrust is not None
@@ -48,13 +49,19 @@ def sized(name: str) -> Aircraft:
 
 def chord(name: str) -> float:
     """Mean chord of a size, m."""
-    shape = load_aircraft(SHAPE)
+    shape = _shape()
     return shape.geometry.cbar * _longer(shape, SIZES[name])
 
 
 def slower(name: str) -> float:
     """How many times as slow as the shape's the motions of a size are: the root of the lengths' ratio (Froude)."""
-    return float(np.sqrt(_longer(load_aircraft(SHAPE), SIZES[name])))
+    return float(np.sqrt(_longer(_shape(), SIZES[name])))
+
+
+@cache
+def _shape() -> Aircraft:
+    """The aircraft whose shape all have; its file is read once."""
+    return load_aircraft(SHAPE)
 
 
 def _longer(shape: Aircraft, size: Size) -> float:

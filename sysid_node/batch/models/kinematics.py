@@ -6,12 +6,13 @@ Klein & Morelli (2006), eqs. 3.35 and 3.33 for the equations, ch. 10 for data co
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import jax
 import jax.numpy as jnp
 
 from sysid_node.aircraft.model import Vector3
-from sysid_node.batch.models.model import ModelParameter, Scalars, StateSpaceModel
+from sysid_node.batch.models.model import ModelEquations, ModelParameter, Scalars, StateSpaceModel
 from sysid_node.dynamics.airflow import flow_angles, velocity_of, wind_axes_rates
 from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.dynamics.attitude import down_of_euler, euler_rates
@@ -70,6 +71,16 @@ def sensor_errors(outputs: Sequence[str], probe: Vector3 = (0.0, 0.0, 0.0)) -> S
         for name in names
     )
 
+    equations = _equations(names, tuple(outputs), tuple(probe))
+    return StateSpaceModel(
+        "sensor_errors", STATES, INPUTS, tuple(outputs), parameters, equations.derivative, equations.output
+    )
+
+
+@lru_cache(maxsize=16)
+def _equations(names: tuple[str, ...], outputs: tuple[str, ...], probe: Vector3) -> ModelEquations:
+    """The equations of the errors of these names, the same ones for all models, so that they are compiled once."""
+
     def signals(x: Scalars, u: Scalars, error: Mapping[str, jax.Array]) -> dict[str, jax.Array]:
         s = dict(zip(STATES, x, strict=True)) | dict(zip(INPUTS, u, strict=True))
         return s | {rate: s[rate] - error[f"bias_{rate}"] for rate in "pqr"}
@@ -89,4 +100,4 @@ def sensor_errors(outputs: Sequence[str], probe: Vector3 = (0.0, 0.0, 0.0)) -> S
             (1.0 + error.get(f"scale_{name}", 0.0)) * s[name] + error.get(f"bias_{name}", 0.0) for name in outputs
         )
 
-    return StateSpaceModel("sensor_errors", STATES, INPUTS, tuple(outputs), parameters, derivative, output)
+    return ModelEquations(derivative, output)

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 
 import jax
 import jax.numpy as jnp
@@ -19,7 +21,7 @@ from sysid_node.aircraft.stated_effects import stated_cg
 from sysid_node.batch.models.aerodynamics import coefficient_function, derivative_parameters
 from sysid_node.batch.models.gusts import DRIVEN, air_relative, gust_parameters, gust_rates, gust_states
 from sysid_node.batch.models.kinematics import at_probe, attitude_rates, flow_rates
-from sysid_node.batch.models.model import Scalars, StateSpaceModel
+from sysid_node.batch.models.model import ModelEquations, Scalars, StateSpaceModel
 from sysid_node.dynamics.vector import Vector
 from sysid_node.errors import InputError
 
@@ -83,15 +85,19 @@ def rigid_body(
     all_states = (*states, *(gust_states(states) if gusts else ()))
     inputs = _inputs(aircraft, states, names, modelled, thrust)
     rotation = gust_parameters(all_states)
-    motion = _Motion(aircraft, all_states, inputs, (names, tuple(p.name for p in rotation)), reference_rates)
+    bare = replace(aircraft, derivatives={})  # their values are parameters
+    named = (names, tuple(p.name for p in rotation))
+    equations = _equations(
+        _Structure(repr(bare), all_states, inputs, tuple(outputs), named, reference_rates, aircraft=bare)
+    )
     return StateSpaceModel(
         name="rigid_body",
         states=all_states,
         inputs=inputs,
         outputs=tuple(outputs),
         parameters=(*derivatives, *rotation),
-        derivative=motion.derivative,
-        output=lambda x, u, theta: motion.output(outputs, x, u, theta),
+        derivative=equations.derivative,
+        output=equations.output,
         units=dict(OUTPUTS),
         driven={name: DRIVEN[name] for name in all_states if name in DRIVEN} if gusts else None,
     )
@@ -134,6 +140,27 @@ def _measured_forces(modelled: Sequence[str]) -> list[str]:
     ax_cg, ay_cg, az_cg = AT_CG
     longitudinal = [] if {"CL", "CD"} <= set(modelled) else [ax_cg, az_cg]
     return longitudinal + ([] if "CY" in modelled else [ay_cg])
+
+
+@dataclass(frozen=True)
+class _Structure:
+    """What the equations of a model depend on: the aircraft as text, names, and how rates are made non-dimensional."""
+
+    text: str
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    names: tuple[tuple[str, ...], tuple[str, ...]]
+    reference_rates: bool
+    aircraft: Aircraft = field(compare=False)
+
+
+@lru_cache(maxsize=16)
+def _equations(structure: _Structure) -> ModelEquations:
+    """The equations of a structure, the same ones for all its models, so that they are traced and compiled once."""
+    s = structure
+    motion = _Motion(s.aircraft, s.states, s.inputs, s.names, s.reference_rates)
+    return ModelEquations(motion.derivative, partial(motion.output, s.outputs))
 
 
 class _Motion:

@@ -90,11 +90,11 @@ def local_workers(count: int, memory: str | None = None) -> Iterator[Workers]:
 
 
 @contextlib.contextmanager
-def connected(address: str) -> Iterator[Workers]:
-    """The workers of the scheduler at ``address``. Raises InputError where none answers."""
+def connected(address: str, answer_within_s: float = _ANSWER) -> Iterator[Workers]:
+    """The workers of the scheduler at ``address``. Raises InputError where none answers within so many seconds."""
     _quiet()
     try:
-        client = Client(address, timeout=_ANSWER)
+        client = Client(address, timeout=answer_within_s)
     except (OSError, ValueError, TimeoutError) as error:
         words = " ".join(str(error).split())[:200]
         raise InputError(f"--scheduler {address}: no scheduler answers ({words}); is it dask scheduler's?") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -70,12 +71,12 @@ def residual_model_of(
     record = resampled(flight, simulator.rate)
     highest = highest_frequency(simulator.aircraft, lateral=flight.lateral)
     windows = Windows.over(len(record), simulator.rate, highest=highest)
-    axes = _measured_channels(flight, record)
+    axes, noisy = _measured_channels(flight, record), _with_added_noise(simulator, flight, seed)
     silent = noiseless_model(simulator, flight, record, windows, axes, ObserverMemory(LONGEST_MEMORY, LONGEST_MEMORY))
     with ThreadPoolExecutor(1) as pool:  # compiling needs the processor more than Python's lock
         for program in silent.programs() if will_be_fitted else ():
             pool.submit(program)
-        calm = _with_measured_noise(silent, seed)
+        calm = _with_measured_noise(silent, noisy)
     instruments = best_instrument_parameters(calm)
     calm = replace(calm, gusts=gust_speed(calm, instruments), instruments=instruments)
     memory = observer_memory(calm, instruments)
@@ -84,8 +85,8 @@ def residual_model_of(
     followed = ObserverMemory(memory, 0.0 if is_gusty(calm) else LONGEST_MEMORY)
     shown = _without_drag(axes) if "alpha" in flight.inferred and is_gusty(calm) else axes
     shorter = noiseless_model(simulator, flight, record, windows, shown, followed)
-    known = _with_measured_noise(replace(shorter, gusts=calm.gusts, instruments=instruments), seed)
-    return replace(known, gain=_noise_gain(known, seed)) if followed.vane == 0.0 else known
+    known = _with_measured_noise(replace(shorter, gusts=calm.gusts, instruments=instruments), noisy)
+    return replace(known, gain=_noise_gain(known, noisy)) if followed.vane == 0.0 else known
 
 
 def residual_model_like(model: ResidualModel, flight: GapFlight) -> ResidualModel:
@@ -124,30 +125,35 @@ def _without_drag(axes: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.asarray(axes & (np.array(CHANNELS) != "CD"))
 
 
-def _with_measured_noise(model: ResidualModel, seed: int) -> ResidualModel:
-    return replace(model, noise=_noise_power(model, np.random.default_rng(seed)))
+def _with_added_noise(simulator: Simulator, flight: GapFlight, seed: int) -> list[FlightRecord]:
+    """The flight's record with a few realisations of its sensors' noise added, one each."""
+    random = np.random.default_rng(seed)
+    noisy = (with_added_noise(simulator.aircraft, flight, random) for _ in range(_REALISATIONS))
+    return [resampled(again, simulator.rate) for again in noisy]
 
 
-def _noise_power(model: ResidualModel, random: np.random.Generator) -> Array:
-    """Power (L, 12) of the sensors' noise in the residual, from a few realisations of it added to the flight."""
+def _with_measured_noise(model: ResidualModel, noisy: Sequence[FlightRecord]) -> ResidualModel:
+    return replace(model, noise=_noise_power(model, noisy))
+
+
+def _noise_power(model: ResidualModel, noisy: Sequence[FlightRecord]) -> Array:
+    """Power (L, 12) of the sensors' noise in the residual, from records with a realisation of it added to each."""
     simulator, neutral = model.simulator, model.simulator.neutral()
     clean = model.residual(neutral)
     power = np.zeros(clean.shape[1:])
-    for _ in range(_REALISATIONS):
-        record = resampled(with_added_noise(simulator.aircraft, model.flight, random), simulator.rate)
+    for record in noisy:
         again = noiseless_model(simulator, model.flight, record, model.windows, model.axes, model.inputs.memory)
-        power += (np.abs(again.residual(neutral) - clean) ** 2).mean(axis=0) / _REALISATIONS
+        power += (np.abs(again.residual(neutral) - clean) ** 2).mean(axis=0) / len(noisy)
     return np.maximum(model.windows.smoothed(power), _LEAST_NOISE)
 
 
-def _noise_gain(model: ResidualModel, seed: int) -> NoiseGain:
-    """How the power of the noise depends on the parameters, from a few realisations of it added to the flight."""
+def _noise_gain(model: ResidualModel, noisy: Sequence[FlightRecord]) -> NoiseGain:
+    """How the power of the noise depends on the parameters, from records with a realisation of it added to each."""
     simulator, neutral = model.simulator, model.simulator.neutral()
-    indices, random = noisy_parameters(simulator.names), np.random.default_rng(seed)
+    indices = noisy_parameters(simulator.names)
     clean = _residual_and_slopes(model, indices)
     parts = []
-    for _ in range(_REALISATIONS):
-        record = resampled(with_added_noise(simulator.aircraft, model.flight, random), simulator.rate)
+    for record in noisy:
         again = noiseless_model(simulator, model.flight, record, model.windows, model.axes, model.inputs.memory)
         parts.append(_residual_and_slopes(again, indices) - clean)
     power = (np.abs(clean[..., 0]) ** 2).mean(axis=0)

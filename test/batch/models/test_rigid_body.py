@@ -77,6 +77,20 @@ def test_the_aircraft_files_tolerances_are_priors_where_wanted():
     assert all(p.prior is None for p in rigid_body(KESTREL, ("alpha", "q"), ()).parameters)
 
 
+def test_equations_are_the_same_ones_unless_the_aircraft_is_another():
+    """Compiled programs belong to the equations; the derivatives' values are parameters."""
+    derivative = dataclasses.replace(KESTREL.derivatives["Cm_q"], value=-1.0)
+    other = dataclasses.replace(KESTREL, derivatives={**KESTREL.derivatives, "Cm_q": derivative})
+    known = rigid_body(KESTREL, ("alpha", "q"), ("alpha", "q")).dynamics
+    assert rigid_body(other, ("alpha", "q"), ("alpha", "q")).dynamics == known
+    for changed in (
+        rigid_body(dataclasses.replace(KESTREL, mass=2.0 * KESTREL.mass), ("alpha", "q"), ("alpha", "q")),
+        rigid_body(KESTREL, ("alpha", "q"), ("alpha", "az")),
+        rigid_body(KESTREL, ("alpha", "q"), ("alpha", "q"), reference_rates=True),
+    ):
+        assert changed.dynamics != known
+
+
 def test_what_cannot_be_is_refused():
     with pytest.raises(InputError, match="state 'speed' is not known"):
         rigid_body(KESTREL, ("speed",), ())

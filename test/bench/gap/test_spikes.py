@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import butter, sosfiltfilt
 
-from bench.gap.spikes import diagnosed
+from bench.gap.spikes import diagnosed, gap_flight
 from bench.spikes import ledger, scores
 from bench.spikes.drawing import SETS, Case, draw
 from bench.spikes.editing import EFFECTS, edited, misbelieved
@@ -23,6 +23,11 @@ from sysid_node.dynamics.airflow import flow_angles, velocity_of
 from sysid_node.dynamics.lever_arm import specific_force_from, velocity_from
 from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import FlightRecord
+from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
+from sysid_node.gap.flightdata.time_scales import analysis_rate
+from sysid_node.gap.residuals.build import residual_model_of
+from sysid_node.gap.selection.forward_selection import Attribution, attribute
+from sysid_node.sim import Simulator
 
 RECORDS = Path(__file__).resolve().parents[4] / "shared" / "flights"
 STEP = 0.01
@@ -251,17 +256,34 @@ def test_a_file_of_another_mass_is_left_for_derivatives_that_fly_the_record() ->
     assert gap["after"] < 0.2 * gap["before"]
 
 
+def attributed(case: Case) -> Attribution:
+    """The causes of a case as a diagnosis finds them, before the gap is measured."""
+    flight = FLIGHTS[case.flight]
+    aircraft = misbelieved(belief(RECORDS, flight), case.effect, case.values)
+    fitted, held = (
+        [gap_flight(aircraft, edited(part(RECORDS, flight, span), case.effect, case.values), span[0]) for span in spans]
+        for spans in (flight.fitted, flight.held)
+    )
+    simulator = Simulator(aircraft, analysis_rate(aircraft, lateral=any(each.lateral for each in fitted)))
+    models, others = ([residual_model_of(simulator, each) for each in group] for group in (fitted, held))
+    every = (*models, *others)
+    nuisances = nuisances_of(aircraft, models[0], every, fitted_with=models[1:])
+    held_out = [HeldOutFlight(model, nuisances_of(aircraft, model, every)) for model in others]
+    return attribute(models, nuisances, lambda share, text: None, None, held_out)
+
+
 @pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
 def test_late_commands_beside_a_lag_are_no_servo_of_second_order() -> None:
     """Both have as many parameters, and the lag and the delay predict the record better."""
-    causes = diagnosed(RECORDS, Case(0, "cessna_de", "command_delay", {"delay": 0.09}))["causes"]
-    assert {cause["label"] for cause in causes} == {"command_delay", "actuator_lag"}
-    (delay,) = (cause["parameters"]["elevator"] for cause in causes if cause["effect"] == "command_delay")
-    assert delay[0] == pytest.approx(0.09, rel=0.2)
+    fit = attributed(Case(0, "cessna_de", "command_delay", {"delay": 0.09})).corrected
+    names = [fit.simulator.names[i] for i in fit.indices]
+    sizes = dict(zip(names, fit.values, strict=True))
+    assert set(sizes) == {"command_delay.delay", "actuator_lag.time_constant"}
+    assert sizes["command_delay.delay"] == pytest.approx(0.09, rel=0.2)
 
 
 @pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
 def test_what_was_dropped_beside_one_cause_is_looked_for_beside_what_took_its_place() -> None:
     """Beside slow servos of all surfaces half an aileron is not needed; slow ailerons alone leave it to be found."""
-    causes = diagnosed(RECORDS, Case(0, "cessna_da", "control_effectiveness_loss", {"aileron": 0.46}))["causes"]
-    assert {cause["label"] for cause in causes} == {"actuator_lag of aileron", "control_effectiveness_loss of aileron"}
+    found = attributed(Case(0, "cessna_da", "control_effectiveness_loss", {"aileron": 0.46}))
+    assert set(found.labels) == {"actuator_lag of aileron", "control_effectiveness_loss of aileron"}

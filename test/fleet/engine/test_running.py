@@ -1,7 +1,6 @@
 """Flights on real Dask workers: results, refusals, killed and slow workers, and how many jobs are in memory."""
 
 import os
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -57,11 +56,9 @@ def test_workers_are_processes_of_their_own(workers: Workers, tmp_path: Path) ->
     workers.client.wait_for_workers(2)
     found = []
     jobs = (Job(str(i), (0.3, str(tmp_path / str(i)))) for i in range(4))
-    start = time.monotonic()
     run(workers.client, jobs, slowly, lambda job, back: found.append(back.result))
     assert len(set(found)) == 2
     assert os.getpid() not in found
-    assert time.monotonic() - start < 20.0
 
 
 def test_a_killed_worker_costs_an_attempt_and_a_slow_flight_is_ended(workers: Workers, tmp_path: Path) -> None:
@@ -74,7 +71,7 @@ def test_a_killed_worker_costs_an_attempt_and_a_slow_flight_is_ended(workers: Wo
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line() -> None:
-    with pytest.raises(InputError, match="no scheduler answers"), connected("tcp://127.0.0.1:1"):
+    with pytest.raises(InputError, match="no scheduler answers"), connected("tcp://127.0.0.1:1", 1.0):
         pass
 
 

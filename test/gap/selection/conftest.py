@@ -49,7 +49,7 @@ def late_and_scaled(aircraft) -> Fitted:
 def mistaken(aircraft) -> Fitted:
     """As ``late``, with effects that change derivatives, too."""
     wanted = ("command_delay", "derivative_error of Cm", "imu_scale", "cg_shift", "mass_error", "inertia_error",
-              "thrust_scale", "airspeed_scale")  # fmt: skip
+              "thrust_scale")  # fmt: skip
     return _fitted(aircraft, {"command_delay": {"delay": 0.1}, "cg_shift": {"x": 0.02}}, 20, wanted)
 
 

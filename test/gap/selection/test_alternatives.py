@@ -61,7 +61,7 @@ def test_servos_of_second_order_are_told_from_a_lag_and_from_a_delay(oscillating
 def test_wrong_derivatives_are_compared_with_every_effect_that_was_fitted_alone(mistaken) -> None:
     """Another cause is compared with the likeliest of them only, and with what delays the response as it does."""
     fitter, base, candidates = mistaken
-    names = ("imu_scale", "cg_shift", "mass_error", "inertia_error", "thrust_scale", "airspeed_scale")
+    names = ("imu_scale", "cg_shift", "mass_error", "inertia_error", "thrust_scale")
     first = [fitter.add_candidate(base, candidates[name]) for name in names]
     delay = fitter.add_candidate(base, candidates["command_delay"])
     both = fitter.add_candidate(delay, candidates["derivative_error of Cm"])

@@ -49,13 +49,13 @@ def test_what_was_lost_before_the_surface_moved_was_lost_before_the_flight(aircr
 
 
 def test_an_onset_in_gusts_is_as_far_off_as_its_standard_error_says(aircraft) -> None:
-    """The squares of eight errors have a chi-square distribution, 1 % of it beyond 20.1.
+    """The squares of three errors have a chi-square distribution, 1 % of it beyond 11.3.
 
     Only the autopilot moves the elevator from 11 to 17 s. Over 17 flights the errors were 0.8 s (rms), 1.1 times what
     was stated.
     """
     errors, squares = [], 0.0
-    for seed in (15, *range(21, 28)):
+    for seed in (15, 21, 22):
         far, candidate = fitted(aircraft, 13.0, 16.0, "light", seed)
         loss, onset = (far.indices.index(i) for i in candidate.indices)
         found = liml_estimate(converged(search_onset(far, candidate)))
@@ -64,5 +64,5 @@ def test_an_onset_in_gusts_is_as_far_off_as_its_standard_error_says(aircraft) ->
         squares += (errors[-1] / stated[onset]) ** 2
         assert 0.4 < stated[onset] < 2.0
         assert abs(found.values[loss] - 0.5) < 2.5 * stated[loss] < 0.1
-    assert squares < 20.1
+    assert squares < 11.3
     assert np.sqrt(np.mean(np.square(errors))) < 1.5

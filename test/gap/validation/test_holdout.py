@@ -140,12 +140,3 @@ def test_causes_beside_the_file_keep_their_size_and_leave_the_derivatives(laggin
     point, corrected = fit.flights[0].point, attribution.corrected.flights[0].point
     assert beside.keeps_file_derivatives and point[lag] == corrected[lag] == pytest.approx(0.08, rel=0.1)
     assert np.flatnonzero(point != fit.simulator.neutral()).tolist() == [lag]
-
-
-def test_a_single_flight_with_each_manoeuvre_once_is_checked_on_its_parts(aircraft) -> None:
-    """Each part then holds what no other does; a lag that moved every reading must not be lost for that."""
-    steps = ["3211:elevator:start=2", "3211:aileron:start=11", "3211:rudder:start=20"]
-    flight = fly(aircraft, {"actuator_lag": {"time_constant": 0.09}}, seed=3, manoeuvre=steps, duration=29.0)
-    found = diagnose(aircraft, [flight], [])
-    assert [cause.candidate.effect for cause in found.attribution.causes] == ["actuator_lag"]
-    assert found.size.after < 0.7 * found.size.before

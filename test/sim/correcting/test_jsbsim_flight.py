@@ -22,7 +22,7 @@ EFFECTS = {"actuator_lag": {"elevator": 0.05, "aileron": 0.03, "rudder": 0.04}, 
 
 
 #: JSBSim's frames a second, and the largest difference that they leave, as a share of a signal's range.
-FRAMES = {400.0: 0.02, 6400.0: 0.01}
+FRAMES = {400.0: 0.02, 3200.0: 0.01}
 
 
 @pytest.fixture(scope="module", params=FRAMES)
@@ -52,7 +52,7 @@ def share(theirs, ours):
 
 
 def test_short_flights_are_those_of_our_simulator(flown):
-    """Rates, velocity, attitude and specific force within 2 % of their ranges; with 16 times the frames, within 1 %.
+    """Rates, velocity, attitude and specific force within 2 % of their ranges; with 8 times the frames, within 1 %.
 
     The difference is that of JSBSim's frames of 2.5 ms: it applies a frame's surfaces one frame later and integrates by
     lower orders. What more frames leave is mostly in the forward speed: its earth turns, and its gravity falls off.

@@ -16,14 +16,9 @@ pytest.importorskip("jsbsim", reason="JSBSim is not installed")
 
 from sysid_node.sim.importing.jsbsim.files import copy_model, find_model, sections
 from sysid_node.sim.importing.jsbsim.program import Flight, Program
-from sysid_node.sim.importing.jsbsim.read import read_jsbsim, read_model
+from sysid_node.sim.importing.jsbsim.read import read_jsbsim
 from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, properties_at
 from sysid_node.sim.importing.jsbsim.survey import survey_model
-
-
-@pytest.fixture(scope="module")
-def cessna():
-    return read_model("c172p", 52.0, 900.0)
 
 
 def test_derivatives_are_those_found_by_finite_differences(cessna):

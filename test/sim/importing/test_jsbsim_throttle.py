@@ -14,9 +14,9 @@ from sysid_node.sim.importing.jsbsim.program import Program
 from sysid_node.sim.importing.jsbsim.read import read_jsbsim, read_model
 
 
-@pytest.fixture(scope="module", params=[("T37", 77.0), ("c172p", 52.0)], ids=["T37", "c172p"])
+@pytest.fixture(scope="module", params=["T37", "c172p"])
 def model(request):
-    return read_model(*request.param, 900.0)
+    return request.getfixturevalue("cessna") if request.param == "c172p" else read_model("T37", 77.0, 900.0)
 
 
 def test_forces_follow_the_throttle_and_the_airspeed_as_in_jsbsim(model, tmp_path):

@@ -29,36 +29,6 @@ def grid(**values):
     return {name: np.broadcast_to(values.get(name, value), size) for name, value in still.items()}
 
 
-def test_jsbsim_holds_every_derivative(kestrel, tmp_path):
-    """Coefficients are linear, so that equal derivatives are equal coefficients in every state."""
-    pytest.importorskip("jsbsim", reason="JSBSim is not installed")
-    path = tmp_path / "kestrel.xml"
-    path.write_text(jsbsim_model(kestrel, {"actuator_lag": {"elevator": 0.03}}))
-    found = read_jsbsim(str(path), 16.0, 0.0).aircraft
-    assert not found.tables
-    for name in {*found.derivatives, *kestrel.derivatives}:
-        known = kestrel.derivatives[name].value if name in kestrel.derivatives else 0.0
-        assert found.derivatives[name].value == pytest.approx(known, abs=1e-6), name
-    assert found.effects["actuator_lag"]["elevator"].value == pytest.approx(0.03)
-    assert found.mass == pytest.approx(kestrel.mass, rel=1e-6)
-    assert found.inertia.Iyy == pytest.approx(kestrel.inertia.Iyy, rel=1e-3)  # JSBSim's slugs have four digits
-    assert found.throttle.max_thrust == pytest.approx(kestrel.throttle.max_thrust, rel=1e-6)
-
-
-def test_jsbsim_holds_tables_over_the_throttle(kestrel, tmp_path):
-    pytest.importorskip("jsbsim", reason="JSBSim is not installed")
-    table = LookupTable("CD", ("throttle",), ((0.0, 0.35, 1.0),), (0.02, 0.0, -0.06))
-    path = tmp_path / "kestrel.xml"
-    path.write_text(jsbsim_model(replace(kestrel, tables=(table,))))
-    found = read_jsbsim(str(path), 16.0, 0.0).aircraft
-    x = grid(alpha=np.full(41, 0.04)) | {"throttle": np.linspace(0.0, 1.0, 41)}
-    known, read = (
-        coefficients(a, x)[:, 1] - a.throttle.max_thrust * x["throttle"] / (0.5 * 1.225 * 16.0**2 * kestrel.geometry.S)
-        for a in (replace(kestrel, tables=(table,)), found)
-    )
-    np.testing.assert_allclose(read, known, atol=1e-6)
-
-
 SERVOS = {
     "actuator_lag": {"elevator": 0.03, "aileron": 0.05, "rudder": 0.02},
     "actuator_rate_limit": {"elevator": 2.0, "aileron": 3.0},
@@ -67,19 +37,39 @@ SERVOS = {
     "command_delay": {"elevator": 0.02, "throttle": 0.1},
     "motor_lag": {"time_constant": 0.3},
 }
+SECOND_ORDER = {"actuator_lag": {"elevator": 0.03, "aileron": 0.05, "rudder": 0.02, "damping": 0.7}}
 
 
-def test_jsbsim_holds_servos_and_motor(kestrel, tmp_path):
-    """Every servo and motor with its numbers, among them those of second order."""
+def from_jsbsim(aircraft, effects, folder):
     pytest.importorskip("jsbsim", reason="JSBSim is not installed")
-    for name, effects in (("first", SERVOS), ("second", SERVOS | {"actuator_lag": SECOND_ORDER})):
-        path = tmp_path / f"{name}.xml"
-        path.write_text(jsbsim_model(kestrel, effects))
-        found = read_jsbsim(str(path), 16.0, 0.0).aircraft.effect_values()
-        assert {n: pytest.approx(v, rel=1e-6) for n, v in effects.items()} == found
+    path = folder / "kestrel.xml"
+    path.write_text(jsbsim_model(aircraft, effects))
+    return read_jsbsim(str(path), 16.0, 0.0).aircraft
 
 
-SECOND_ORDER = {"elevator": 0.03, "aileron": 0.05, "rudder": 0.02, "damping": 0.7}
+def test_jsbsim_holds_every_derivative_servos_and_the_motor(kestrel, tmp_path):
+    """Coefficients are linear, so that equal derivatives are equal coefficients in every state."""
+    found = from_jsbsim(kestrel, SERVOS, tmp_path)
+    assert not found.tables
+    for name in {*found.derivatives, *kestrel.derivatives}:
+        known = kestrel.derivatives[name].value if name in kestrel.derivatives else 0.0
+        assert found.derivatives[name].value == pytest.approx(known, abs=1e-6), name
+    assert {n: pytest.approx(v, rel=1e-6) for n, v in SERVOS.items()} == found.effect_values()
+    assert found.mass == pytest.approx(kestrel.mass, rel=1e-6)
+    assert found.inertia.Iyy == pytest.approx(kestrel.inertia.Iyy, rel=1e-3)  # JSBSim's slugs have four digits
+    assert found.throttle.max_thrust == pytest.approx(kestrel.throttle.max_thrust, rel=1e-6)
+
+
+def test_jsbsim_holds_tables_over_the_throttle_and_servos_of_second_order(kestrel, tmp_path):
+    table = LookupTable("CD", ("throttle",), ((0.0, 0.35, 1.0),), (0.02, 0.0, -0.06))
+    found = from_jsbsim(replace(kestrel, tables=(table,)), SECOND_ORDER, tmp_path)
+    x = grid(alpha=np.full(41, 0.04)) | {"throttle": np.linspace(0.0, 1.0, 41)}
+    known, read = (
+        coefficients(a, x)[:, 1] - a.throttle.max_thrust * x["throttle"] / (0.5 * 1.225 * 16.0**2 * kestrel.geometry.S)
+        for a in (replace(kestrel, tables=(table,)), found)
+    )
+    np.testing.assert_allclose(read, known, atol=1e-6)
+    assert {n: pytest.approx(v, rel=1e-6) for n, v in SECOND_ORDER.items()} == found.effect_values()
 
 
 def table(coefficient, over, points, function):
@@ -105,11 +95,8 @@ TABLES = (
 @pytest.fixture(scope="module")
 def with_tables(kestrel, tmp_path_factory):
     """The aircraft with tables, and what comes back."""
-    pytest.importorskip("jsbsim", reason="JSBSim is not installed")
-    path = tmp_path_factory.mktemp("jsbsim") / "kestrel.xml"
     known = replace(kestrel, tables=TABLES)
-    path.write_text(jsbsim_model(known))
-    return known, read_jsbsim(str(path), 16.0, 0.0).aircraft
+    return known, from_jsbsim(known, {}, tmp_path_factory.mktemp("jsbsim"))
 
 
 @pytest.mark.parametrize("over", [t.over for t in TABLES], ids="-".join)
