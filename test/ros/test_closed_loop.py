@@ -12,7 +12,6 @@ import rclpy
 from harness import start
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import Imu, JointState
-from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData
 
 from sysid_node.ros.support.loop_node import COMMAND, LATEST, named
@@ -200,20 +199,11 @@ def test_the_simulator_flies_and_refuses_nonsense(watch: LoopWatch) -> None:
     node.destroy_node()
 
 
-def test_the_exciter_needs_sensors(watch: LoopWatch) -> None:
-    """Without any it does not begin, and says why."""
-    with flying(exciter=begin(EXCITER)):
-        assert watch.excite() == "roll not measured: excitation would be aborted at once"
-        answer = watch.call(Trigger, "exciter/stop", Trigger.Request())
-        assert answer.success
-
-
 @pytest.mark.parametrize(
     ("name", "parameter", "words"),
     [
         (SIMULATOR, "effects:=wings_off", "wings_off"),
         (CONTROLLER, "gain_margin:=0.1", "gain_margin"),
-        (EXCITER, "manoeuvre:=loop:elevator:amplitude=1", "loop"),
     ],
 )
 def test_wrong_parameters_end_the_node_with_one_line(ros: None, name: str, parameter: str, words: str) -> None:
