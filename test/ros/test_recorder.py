@@ -2,12 +2,13 @@
 
 import contextlib
 import signal
-import time
 from pathlib import Path
 
 import numpy as np
 from due_times import due_times
 from harness import LOSSLESS, Probe, ended, start, start_identifier
+from rcl_interfaces.msg import Log
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag.reader import read_streams
@@ -53,11 +54,15 @@ def test_a_bag_that_exists_is_left_alone(tmp_path: Path) -> None:
     assert "Traceback" not in text
 
 
-def test_it_says_how_much_was_recorded_and_what_is_missing(tmp_path: Path, ros: None) -> None:
+def test_it_says_how_much_was_recorded_and_what_is_missing(tmp_path: Path, probe: Probe) -> None:
+    said: list[Log] = []
+    kept = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    probe.node.create_subscription(Log, "/rosout", said.append, kept)
     process = start("recorder", str(tmp_path / "empty"))
     assert process.stdout is not None
     assert "records into" in process.stdout.readline()
-    time.sleep(0.5)  # rcl prints the line before it publishes it on /rosout, and complains of a signal in between
+    # rcl prints the line before it publishes it on /rosout, and complains of a signal in between
+    probe.until(lambda: any("records into" in log.msg for log in said))
     process.send_signal(signal.SIGINT)
     text, _ = process.communicate(timeout=60.0)
     assert "recorded 0 messages of 0 topics; nothing came on /imu/data, /air_data, /actuators" in text

@@ -88,7 +88,7 @@ class Shifts:
         self.single = np.array(single, dtype=np.intp)  # (n,)
         sizes = np.array([shift.spread.size for shift in shifts])
         places = [np.flatnonzero(sizes == m) for m in np.unique(sizes[sizes > 1])]
-        self.groups = [ShiftGroup(place, [shifts[i] for i in place]) for place in places]
+        self.groups = [ShiftGroup(place, [shifts[i] for i in place.tolist()]) for place in places]
         self.fixed = np.column_stack([shifts[i].fixed for i in single])  # (D, n)
         self.free = np.column_stack([shifts[i].free[:, 0] for i in single])  # (D, n)
         self.freedom = np.array([shift.spread.size for shift in shifts])  # (H,)
@@ -125,9 +125,7 @@ def weigh_each(
     return [found.get(i, _IMPOSSIBLE) for i in range(len(shifts.each))]
 
 
-def _weigh_group(
-    J: Array, v: Array, group: ShiftGroup, wanted: NDArray[np.intp], excess: Array
-) -> dict[int, Weighed]:
+def _weigh_group(J: Array, v: Array, group: ShiftGroup, wanted: NDArray[np.intp], excess: Array) -> dict[int, Weighed]:
     """``weigh`` for the ``wanted`` shifts of a group, by their places among all."""
     places, prior = group.places[wanted], group.prior[wanted]
     G = group.across[wanted] @ J @ group.free[wanted] / excess[places, None, None]
