@@ -332,15 +332,18 @@ def test_a_reported_fault_has_a_watching_exciter_begin_again_at_once(client: Cli
         return client.said(name).startswith("known after")
 
     client.until(done)
-    client.spin(0.2)
+
+    def rests() -> bool:
+        newest = client.excitation_of_others[-6:]
+        return len(newest) == 6 and not any(any(moved) for _, moved in newest)
+
+    client.until(rests)
     client.excitation_of_others.clear()
-    client.until(lambda: len(client.excitation_of_others) > 5)
-    assert not any(any(moved) for _, moved in client.excitation_of_others)
     reported = client.node.get_clock().now().nanoseconds
     client.faults.publish(fault("elevator", "loss of effectiveness"))
     client.until(lambda: any(any(moved) for _, moved in client.excitation_of_others))
     begun = next(stamp for stamp, moved in client.excitation_of_others if any(moved))
-    assert begun - reported < 3_000_000_000, "a busy machine is slow, too"
+    assert begun - reported < 8_000_000_000, "a busy machine is slow, too"
     client.until(lambda: "begun again: elevator: loss of effectiveness" in str(client.status[name].values))
     assert client.call(Trigger, "/uav3/exciter/stop", Trigger.Request()).success
 
@@ -421,9 +424,8 @@ def test_when_estimates_cease_the_surfaces_move_by_the_baseline_within_half_a_se
 
 def test_changes_of_what_is_flown_and_limits_reached_are_in_the_log(client: Client, vehicles: Vehicles) -> None:
     """After gains were adapted and the baseline came back: a nose that is far too high, whatever the elevator does."""
-    log = vehicles.log("adaptive_controller")
-    assert "pitch gains: adapted" in log
-    assert "pitch gains: baseline: no estimates for" in log
+    for words in ("pitch gains: adapted", "pitch gains: baseline: no estimates for"):
+        client.until(lambda words=words: words in vehicles.log("adaptive_controller"))  # type: ignore[misc]
     client.flies = False
 
     def said() -> bool:
