@@ -47,10 +47,10 @@ def fly(predictor, commands, unknowns):
 
 
 def test_monte_carlo_scatter_is_what_was_predicted(predictor, prediction):
-    """60 noisy flights, each fitted by two steps of Gauss-Newton from a start off by a sixtieth of the tolerances.
+    """Thirty noisy flights, each fitted by two steps of Gauss-Newton from a start off by a sixtieth of the tolerances.
 
     Errors weighed by the predicted information are chi-square with 27 degrees of freedom a flight: their mean over 27
-    is one within 1/sqrt(30 * 27) = 3.5 % (1 sigma); each scatter within 9 %. Bounds at four of these.
+    is one within 1/sqrt(15 * 27) = 5 % (1 sigma); each scatter within 13 %. Bounds at four of these.
     """
     generator = np.random.default_rng(11)
     columns = [predictor.simulator.outputs.index(name) for name in MEASURED]
@@ -60,7 +60,7 @@ def test_monte_carlo_scatter_is_what_was_predicted(predictor, prediction):
     outputs, commands = outputs_and_commands(prediction)
     clean, n = outputs[:, columns], len(outputs)
     errors = []
-    for _ in range(60):
+    for _ in range(30):
         measured = clean + sigma * generator.normal(size=clean.shape)
         unknowns = np.zeros(count + 8)
         unknowns[:count] = offset * generator.choice([-1.0, 1.0], count)
@@ -72,9 +72,9 @@ def test_monte_carlo_scatter_is_what_was_predicted(predictor, prediction):
         errors.append(unknowns[:count])
     scatter = np.array(errors)
     distance = np.einsum("ni,ij,nj->n", scatter, prediction.information.matrix, scatter) / count
-    assert distance.mean() == pytest.approx(1.0, abs=4 * 0.035)
+    assert distance.mean() == pytest.approx(1.0, abs=4 * 0.05)
     ratio = np.sqrt(np.mean(scatter**2, axis=0)) / prediction.information.standard_errors
-    assert np.all(np.abs(ratio - 1) < 4 * 0.09)
+    assert np.all(np.abs(ratio - 1) < 4 * 0.13)
 
 
 def test_slopes_agree_with_differences(predictor, prediction):

@@ -72,7 +72,7 @@ def damaged(d: dict[str, float], x: dict[str, float]) -> tuple[dict[str, float],
 def test_which_how_much_and_since_when(truth: Truth, kind: str, part: str, size: float) -> None:
     state, maker = flown(seed=3)
     assert state.fault is None
-    fault = fly(state, maker, 8.0, truth)
+    fault = fly(state, maker, 5.0, truth)
     assert fault is not None
     assert (fault.kind, fault.part) == (kind, part), fault.text
     assert fault.lower <= size <= fault.upper, fault.text
@@ -83,7 +83,7 @@ def test_which_how_much_and_since_when(truth: Truth, kind: str, part: str, size:
 
 def test_damage_names_the_derivatives_that_changed() -> None:
     state, maker = flown(seed=4)
-    fault = fly(state, maker, 12.0, damaged)
+    fault = fly(state, maker, 8.0, damaged)
     assert fault is not None
     assert (fault.kind, fault.part) == (DAMAGE, "longitudinal")
     assert "Cm_alpha" in [change.name for change in fault.changes]
@@ -92,11 +92,11 @@ def test_damage_names_the_derivatives_that_changed() -> None:
 
 
 @pytest.mark.parametrize("truth", [stuck("de", 0.05), stuck("da", -0.1), lost("de", 0.6), lost("dr", 0.6)])
-@pytest.mark.parametrize("seed", [3, 15, 16])
+@pytest.mark.parametrize("seed", [15, 16])
 def test_a_surface_is_never_called_damage(seed: int, truth: Truth) -> None:
     """Not even in the first moments, in which an axis's dozen derivatives would explain them as well."""
     state, maker = flown(seed)
-    for _ in range(80):
+    for _ in range(40):
         fault = fly(state, maker, PERIOD, truth)
         assert fault is None or fault.kind != DAMAGE, fault.text
     assert fault is not None
@@ -106,7 +106,7 @@ def test_a_jammed_vane() -> None:
     """It reads a constant with its noise while lift says that the angle varies."""
     state, maker = flown(seed=5)
     column = maker.names.index("alpha")
-    for _ in range(80):
+    for _ in range(50):
         block = maker.block()
         read = 0.07 + 0.001 * maker.random.standard_normal()
         row, air = block.regressors.copy(), block.air.copy()
@@ -116,13 +116,13 @@ def test_a_jammed_vane() -> None:
     assert (state.fault.kind, state.fault.part) == (VANE_STUCK, "alpha"), state.fault.text
 
 
-@pytest.mark.parametrize("noise", [0.001, 0.0])  # rad; without any, where what is read no longer comes from the vane
-@pytest.mark.parametrize("seed", [11, 13])
+# rad; without any, where what is read no longer comes from the vane
+@pytest.mark.parametrize(("seed", "noise"), [(11, 0.001), (13, 0.0)])
 def test_a_jammed_vane_while_nothing_else_moves(seed: int, noise: float) -> None:
     """Surfaces and rates rest, gusts alone turn the aircraft into the wind: no derivative seems to change."""
     state, maker = flown(seed)
     column = maker.names.index("beta")
-    for _ in range(150):
+    for _ in range(80):
         for name in ("p", "q", "r", "de", "da", "dr"):
             maker.motion[name] = 0.0
         block = maker.block()
@@ -140,7 +140,7 @@ def test_a_vane_that_reads_its_noise_where_the_angle_rests_has_not_failed() -> N
     column = maker.names.index("beta")
     calm = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.03])
     noise = AIRCRAFT.noise["beta"] / math.sqrt(20)  # of a block's 20 samples
-    for _ in range(1000):
+    for _ in range(600):
         block = maker.block(lambda d, x: (d, x | {"beta": 0.0}), calm)
         row, air = block.regressors.copy(), block.air.copy()
         row[column] = air[2] = noise * maker.random.standard_normal()
@@ -149,9 +149,9 @@ def test_a_vane_that_reads_its_noise_where_the_angle_rests_has_not_failed() -> N
 
 
 def test_nothing_is_found_where_nothing_failed() -> None:
-    """Five minutes; by chance one in hundreds of such flights may raise an alarm (``false_alarms``)."""
+    """Two minutes; by chance one in a thousand of such flights may raise an alarm (``false_alarms``)."""
     state, maker = monitored(seed=1)
-    for _ in range(30):
+    for _ in range(12):
         assert fly(state, maker, 10.0) is None
 
 
@@ -164,17 +164,17 @@ def test_rougher_air_is_no_fault() -> None:
 
 def test_the_alarm_ends_with_the_fault() -> None:
     state, maker = flown(seed=7)
-    assert fly(state, maker, 8.0, lost("de", 0.6)) is not None
-    assert fly(state, maker, 20.0) is None
-    assert fly(state, maker, 30.0, lost("de", 0.6)) is not None
+    assert fly(state, maker, 4.0, lost("de", 0.6)) is not None
+    assert fly(state, maker, 12.0) is None
+    assert fly(state, maker, 6.0, lost("de", 0.6)) is not None
 
 
 def test_a_fault_stands_while_nothing_moves_that_would_show_it() -> None:
-    """Level flight for half a minute, longer than blocks are remembered; then the elevator has its effect again."""
+    """Level flight for 22 s, longer than blocks are remembered; then the elevator has its effect again."""
     state, maker = flown(seed=7)
     found = fly(state, maker, 8.0, lost("de", 0.6))
     maker.moving = 0.0
-    later = fly(state, maker, 30.0, lost("de", 0.6))
+    later = fly(state, maker, 22.0, lost("de", 0.6))
     assert found is not None and later is not None
     assert (later.kind, later.part, later.found) == (LOSS, "elevator", found.found)
     assert later.size == pytest.approx(found.size, abs=0.05)
@@ -210,7 +210,7 @@ def test_the_last_good_derivatives_are_held() -> None:
     assert state.reference.values[place] == -0.47
     assert state.reference.errors[place] == 0.004
     assert state.reference.values[state.terms.names.index("CL_alpha")] == AIRCRAFT.derivatives["CL_alpha"].value
-    fly(state, maker, 8.0, lost("de", 0.6))
+    fly(state, maker, 4.0, lost("de", 0.6))
     known = {"Cm_de": IdentifierEstimate(-0.19, 0.004, True)}
     monitor.receive_estimates(state, 60.0, IdentifierEstimates(known, {}, False))
     fly(state, maker, 12.0, lost("de", 0.6))
@@ -243,7 +243,7 @@ def commanded(seed: int, lateness: float, error: float = 0.006) -> tuple[Monitor
 def test_a_servo_that_becomes_slower_is_named_by_how_much(slower: float) -> None:
     state, maker = commanded(21, 0.03)
     maker.lateness["elevator"] += slower
-    fault = fly(state, maker, 10.0)
+    fault = fly(state, maker, 6.0)
     assert fault is not None
     assert (fault.kind, fault.part, fault.unit) == (SLOWER, "elevator", "s"), fault.text
     assert fault.lower <= slower <= fault.upper

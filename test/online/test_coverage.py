@@ -16,7 +16,7 @@ from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import SAMPLE_COLUMNS
 
 TRUTH = [d.value for d in load_aircraft("cdrw").derivatives.values()]
-FLIGHTS = range(1, 17)
+FLIGHTS = range(1, 9)
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ FLIGHTS = range(1, 17)
     ],
 )
 def test_intervals_hold_the_truth(turbulence, method, valid, hold):
-    """16 flights of 27 derivatives: the estimates of a flight depend on one another, so the bounds are wide."""
+    """Eight flights of 27 derivatives: the estimates of a flight depend on one another, so the bounds are wide."""
     setting = Setting("test", turbulence, seconds=15.0)
     found = estimates("cdrw", setting, [METHODS[method]], np.array([14.9]), FLIGHTS)[0, :, 0]
     verdicts = [judge(found[:, d], truth) for d, truth in enumerate(TRUTH)]
@@ -40,8 +40,8 @@ def test_intervals_hold_the_truth(turbulence, method, valid, hold):
 def test_estimates_stay_valid_where_surfaces_only_answer_gusts():
     """Multisines for 20 s, then straight flight on the autopilot: what was learned stays valid, and holds."""
     sines = "multisine:elevator,aileron,rudder:amplitude=0.06,0.06,0.12:length=20:low=0.1:high=2:start=0.7"
-    setting = Setting("straight flight", "light", manoeuvre=(sines,), seconds=60.0)
-    found = estimates("cdrw", setting, [METHODS["iv_rft"]], np.arange(35.0, 60.0, 5.0), [1, 2])[0]
+    setting = Setting("straight flight", "light", manoeuvre=(sines,), seconds=50.0)
+    found = estimates("cdrw", setting, [METHODS["iv_rft"]], np.arange(35.0, 50.0, 5.0), [1])[0]
     assert (found[..., VALID] > 0.0).mean() > 0.95
     inside = (found[..., LOWER] < TRUTH) & (np.array(TRUTH) < found[..., UPPER])
     assert inside[found[..., VALID] > 0.0].mean() > 0.9
@@ -50,17 +50,16 @@ def test_estimates_stay_valid_where_surfaces_only_answer_gusts():
 def test_gusts_that_surfaces_answer_are_not_taken_for_delays():
     """No instrument and no servo is late, which the estimator does not know. Truth: the aircraft file.
 
-    Without the allowances 29 % of the valid intervals of the first flight do not hold: servos seem early, and so do air
+    Without the allowances 29 % of the valid intervals of this flight do not hold: servos seem early, and so do air
     data, because air that turns acts in proportion to the angles' rates.
     """
     aircraft = load_aircraft("kestrel")
-    batch = fly("kestrel", Setting("delays are not known", "moderate", seconds=150.0), [1, 2])
-    for samples in batch.samples:
-        found = run(aircraft, OnlineSettings(), batch.time, samples, batch.time[-1:])[-1].derivatives
-        hold = [found[name].lower < d.value < found[name].upper for name, d in aircraft.derivatives.items()]
-        valid = [found[name].valid for name in aircraft.derivatives]
-        assert sum(valid) >= 8
-        assert np.mean(np.array(hold)[valid]) > 0.9
+    batch = fly("kestrel", Setting("delays are not known", "moderate", seconds=150.0), [1])
+    found = run(aircraft, OnlineSettings(), batch.time, batch.samples[0], batch.time[-1:])[-1].derivatives
+    hold = [found[name].lower < d.value < found[name].upper for name, d in aircraft.derivatives.items()]
+    valid = [found[name].valid for name in aircraft.derivatives]
+    assert sum(valid) >= 8
+    assert np.mean(np.array(hold)[valid]) > 0.9
 
 
 def test_a_verdict_knows_honest_estimates_from_bold_ones():
@@ -87,7 +86,7 @@ def test_what_is_not_valid_does_not_count():
 
 
 def test_air_data_come_at_their_own_rate_and_are_interpolated():
-    batch = fly("cdrw", Setting("test", seconds=5.0), [1, 2])
+    batch = fly("cdrw", Setting("test", "none", seconds=15.0), FLIGHTS)  # as above: compiled once
     alpha = batch.samples[..., SAMPLE_COLUMNS.index("alpha")]
     np.testing.assert_allclose(alpha[:, 1:-1:2], 0.5 * (alpha[:, :-2:2] + alpha[:, 2::2]), rtol=1e-12)
     assert np.all(batch.samples[..., SAMPLE_COLUMNS.index("air_interval")] == AIR_INTERVAL)

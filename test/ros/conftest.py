@@ -24,7 +24,7 @@ def ros() -> Iterator[None]:
     assert sysid_node.ros
     worker = os.environ.get("PYTEST_XDIST_WORKER", "")
     run = os.getppid() if worker else os.getpid()  # workers of one run have one parent
-    os.environ["ROS_DOMAIN_ID"] = str(1 + (2 * run + int(worker.removeprefix("gw") or 0)) % 100)
+    os.environ["ROS_DOMAIN_ID"] = str(1 + (3 * run + int(worker.removeprefix("gw") or 0)) % 100)
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(ROOT / "config" / "fast_discovery.xml")
     rclpy.init(args=["--ros-args", "-p", "autostart:=false"])

@@ -55,7 +55,7 @@ class Probe:
         while (left := end - time.monotonic()) > 0.0:
             rclpy.spin_once(self.node, timeout_sec=left)
 
-    def until(self, condition: Callable[[], Any], patience: float = 15.0) -> Any:
+    def until(self, condition: Callable[[], Any], patience: float = 60.0) -> Any:
         """Spin until the condition holds; its value. Fails, with what /diagnostics said, where it never does."""
         end = time.monotonic() + patience
         while not (found := condition()):
@@ -75,7 +75,7 @@ class Probe:
     def play(self, bag: Path, *options: str) -> None:
         """Have the player play a bag four times as fast as recorded, and listen until it is done."""
         with ended(start("player", str(bag), "--rate", "4", "--wait", "20", *options)) as player:
-            self.until(lambda: player.poll() is not None, 30.0)
+            self.until(lambda: player.poll() is not None, 90.0)
 
     def speak(self, flight: Streams, start: float = 0.0, stop: float = np.inf, air_data: bool = True) -> None:
         """Publish a flight's messages stamped from ``start`` to ``stop`` s, as fast as they are surely heard."""
@@ -89,12 +89,13 @@ class Probe:
         ]
         if air_data:
             topics.append((flight.air_data, flight.air_data.values, self.say_air_data))
-        messages = sorted(
-            (int(order), int(stamp), say, row)
-            for stream, values, say in topics
-            for order, stamp, row in zip(stream.arrival.order, stream.arrival.stamp_ns, values.tolist(), strict=True)
-            if start <= (stamp - START_NS) / 1e9 < stop
-        )
+        messages = []
+        for stream, values, say in topics:
+            seconds = (stream.arrival.stamp_ns - START_NS) / 1e9
+            chosen = (seconds >= start) & (seconds < stop)
+            rows = (one[chosen].tolist() for one in (stream.arrival.order, stream.arrival.stamp_ns, values))
+            messages += [(order, stamp, say, row) for order, stamp, row in zip(*rows, strict=True)]
+        messages.sort(key=lambda message: message[:2])
         for count, (_, stamp, say, row) in enumerate(messages):
             say(stamp, row)
             if count % 20 == 0:
@@ -122,10 +123,10 @@ class Probe:
         client = self.clients.get(name)
         if client is None:
             client = self.clients[name] = self.node.create_client(kind, name)
-            assert client.wait_for_service(timeout_sec=10.0), name
+            assert client.wait_for_service(timeout_sec=60.0), name
             self.spin(0.5)
         future = client.call_async(request or kind.Request())
-        rclpy.spin_until_future_complete(self.node, future, timeout_sec=10.0)
+        rclpy.spin_until_future_complete(self.node, future, timeout_sec=60.0)
         assert future.done(), f"{name} gave no answer"
         return future.result()
 
@@ -150,7 +151,7 @@ def ended(process: subprocess.Popen[str], said: list[str] | None = None) -> Iter
     try:
         yield process
         process.send_signal(signal.SIGINT)
-        text, _ = process.communicate(timeout=10.0)
+        text, _ = process.communicate(timeout=60.0)
         if said is not None:
             said.append(text)
         assert process.returncode == 0, text

@@ -184,8 +184,8 @@ def test_a_stamp_that_ros_cannot_hold_is_said(standard: tuple[AdapterNode, Any, 
 def test_silence_is_said_under_the_autopilots_topic(
     standard: tuple[AdapterNode, Any, Any], probe: Probe, capfd: Any
 ) -> None:
-    node, imu, _ = standard
-    said = ""
+    """By a node that has said nothing yet: what is said is said again after ten seconds only."""
+    node, imu, said = adapter(Standard), standard[1], ""
 
     def heard() -> bool:
         nonlocal said
@@ -194,7 +194,11 @@ def test_silence_is_said_under_the_autopilots_topic(
         said += capfd.readouterr().err
         return f"{PRESSURE}: no message " in said
 
-    probe.until(heard)
+    try:
+        probe.until(lambda: imu.get_subscription_count() > 1)
+        probe.until(heard)
+    finally:
+        node.destroy_node()
     assert f"{IMU}: no message " not in said.partition(f"{PRESSURE}: no message ")[2]
 
 

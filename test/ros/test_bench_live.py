@@ -18,6 +18,6 @@ def test_told_to_stop_it_ends_without_a_traceback(ros: None, told: signal.Signal
     assert "400 Hz IMU" in process.stdout.readline()
     time.sleep(2.0)  # the node and the flight are starting
     process.send_signal(told)
-    text, _ = process.communicate(timeout=30.0)
+    text, _ = process.communicate(timeout=60.0)
     assert "Traceback" not in text
     assert process.returncode == 0

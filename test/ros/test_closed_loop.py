@@ -12,7 +12,6 @@ import rclpy
 from harness import start
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import Imu, JointState
-from std_srvs.srv import Trigger
 from sysid_msgs.msg import AirData
 
 from sysid_node.ros.support.loop_node import COMMAND, LATEST, named
@@ -50,7 +49,7 @@ def flying(**processes: subprocess.Popen[str]) -> Iterator[dict[str, subprocess.
             process.terminate()
         for process in processes.values():
             try:
-                process.communicate(timeout=10.0)
+                process.communicate(timeout=60.0)
             except subprocess.TimeoutExpired:
                 kill(process)
 
@@ -62,7 +61,7 @@ def watch(ros: None) -> Iterator[LoopWatch]:
     one.close()
 
 
-def until(watch: LoopWatch, condition: Callable[[], bool], what: str, patience: float = 60.0) -> None:
+def until(watch: LoopWatch, condition: Callable[[], bool], what: str, patience: float = 120.0) -> None:
     """Listen until the condition holds, asking for roll and pitch all the while."""
     end = time.monotonic() + patience
     while not condition():
@@ -146,7 +145,7 @@ class Relay:
             watch.listen(0.0005)
         watch.ask_for({"roll": 0.2, "pitch": 0.1})
 
-    def until(self, watch: LoopWatch, condition: Callable[[], bool], patience: float = 60.0) -> None:
+    def until(self, watch: LoopWatch, condition: Callable[[], bool], patience: float = 120.0) -> None:
         """Relay until the condition holds."""
         end = time.monotonic() + patience
         while not condition():
@@ -165,8 +164,7 @@ def test_lost_messages_and_a_silent_sensor(watch: LoopWatch) -> None:
         relay.until(watch, lambda: tracks(watch))
         relay.drop = 0.3
         since = len(watch.tracking)
-        relay.run(watch, 4.0)
-        assert len(watch.tracking) > since + 50
+        relay.until(watch, lambda: len(watch.tracking) > since + 200)
         assert worst(watch, since) < LOST
         relay.drop, relay.silent = 0.0, "air_data"
         relay.until(watch, lambda: "not measured" in watch.said(CONTROLLER))
@@ -201,25 +199,16 @@ def test_the_simulator_flies_and_refuses_nonsense(watch: LoopWatch) -> None:
     node.destroy_node()
 
 
-def test_the_exciter_needs_sensors(watch: LoopWatch) -> None:
-    """Without any it does not begin, and says why."""
-    with flying(exciter=begin(EXCITER)):
-        assert watch.excite() == "roll not measured: excitation would be aborted at once"
-        answer = watch.call(Trigger, "exciter/stop", Trigger.Request())
-        assert answer.success
-
-
 @pytest.mark.parametrize(
     ("name", "parameter", "words"),
     [
         (SIMULATOR, "effects:=wings_off", "wings_off"),
         (CONTROLLER, "gain_margin:=0.1", "gain_margin"),
-        (EXCITER, "manoeuvre:=loop:elevator:amplitude=1", "loop"),
     ],
 )
 def test_wrong_parameters_end_the_node_with_one_line(ros: None, name: str, parameter: str, words: str) -> None:
     process = start(name, "--ros-args", "-p", "aircraft:=cdrw", "-p", parameter)
-    text, _ = process.communicate(timeout=60.0)
+    text, _ = process.communicate(timeout=120.0)
     assert process.returncode == 2
     assert words in text
     assert "Traceback" not in text

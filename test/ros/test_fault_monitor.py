@@ -54,7 +54,7 @@ def heard(ros: None) -> Iterator[tuple[LoopWatch, Listener]]:
     listener.close()
 
 
-def until(watch: LoopWatch, listener: Listener, condition: Callable[[], bool], patience: float = 60.0) -> None:
+def until(watch: LoopWatch, listener: Listener, condition: Callable[[], bool], patience: float = 120.0) -> None:
     """Listen until the condition holds, asking for roll and pitch all the while."""
     end = time.monotonic() + patience
     while not condition():
@@ -68,7 +68,7 @@ def until(watch: LoopWatch, listener: Listener, condition: Callable[[], bool], p
 def test_what_fails_in_the_loop_is_said(heard: tuple[LoopWatch, Listener]) -> None:
     """A jammed servo shows in its position; a lost effect only in the forces; a dead sensor in its silence."""
     watch, listener = heard
-    own = {"fault_monitor": ("learning:=15.0",)}
+    own = {"fault_monitor": ("learning:=10.0",)}
     with contextlib.ExitStack() as stack:
         nodes = {}
         for name in ("flight_simulator", "adaptive_controller", "fault_monitor"):

@@ -121,7 +121,7 @@ class Client:
         while (left := end - time.monotonic()) > 0.0:
             self.executor.spin_once(timeout_sec=left)
 
-    def until(self, condition: Callable[[], Any], patience: float = 30.0) -> Any:
+    def until(self, condition: Callable[[], Any], patience: float = 60.0) -> Any:
         """Spin until the condition holds; its value."""
         end = time.monotonic() + patience
         while not (found := condition()):
@@ -169,7 +169,7 @@ def vehicles(ros: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ve
     for process in one.processes.values():
         process.terminate()
     for name, process in one.processes.items():
-        assert process.wait(timeout=20.0) == 0, one.log(name)
+        assert process.wait(timeout=60.0) == 0, one.log(name)
         assert "Traceback" not in one.log(name), one.log(name)
 
 
@@ -220,7 +220,7 @@ def test_excitation_is_bounded_and_leaves_nothing_behind(client: Client) -> None
     client.until(lambda: "excitation not finite, dropped" in client.said(CONTROLLER))
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     values=st.tuples(*[ANY] * 9),
     seconds=st.integers(-(2**31), 2**31 - 1) | st.just(2**31 - 1),
@@ -332,15 +332,18 @@ def test_a_reported_fault_has_a_watching_exciter_begin_again_at_once(client: Cli
         return client.said(name).startswith("known after")
 
     client.until(done)
-    client.spin(0.2)
+
+    def rests() -> bool:
+        newest = client.excitation_of_others[-6:]
+        return len(newest) == 6 and not any(any(moved) for _, moved in newest)
+
+    client.until(rests)
     client.excitation_of_others.clear()
-    client.until(lambda: len(client.excitation_of_others) > 5)
-    assert not any(any(moved) for _, moved in client.excitation_of_others)
     reported = client.node.get_clock().now().nanoseconds
     client.faults.publish(fault("elevator", "loss of effectiveness"))
     client.until(lambda: any(any(moved) for _, moved in client.excitation_of_others))
     begun = next(stamp for stamp, moved in client.excitation_of_others if any(moved))
-    assert begun - reported < 3_000_000_000, "a busy machine is slow, too"
+    assert begun - reported < 8_000_000_000, "a busy machine is slow, too"
     client.until(lambda: "begun again: elevator: loss of effectiveness" in str(client.status[name].values))
     assert client.call(Trigger, "/uav3/exciter/stop", Trigger.Request()).success
 
@@ -401,8 +404,7 @@ def weak_elevator(client: Client) -> DerivativeEstimates:
     return DerivativeEstimates(header=client.header(), aircraft="cdrw", derivatives=derivatives, fits=fits)
 
 
-@pytest.mark.parametrize("_", range(3))
-def test_when_estimates_cease_the_surfaces_move_by_the_baseline_within_half_a_second(client: Client, _: int) -> None:
+def test_when_estimates_cease_the_surfaces_move_by_the_baseline_within_half_a_second(client: Client) -> None:
     baseline = jump(client)
 
     def adapted() -> bool:
@@ -422,9 +424,8 @@ def test_when_estimates_cease_the_surfaces_move_by_the_baseline_within_half_a_se
 
 def test_changes_of_what_is_flown_and_limits_reached_are_in_the_log(client: Client, vehicles: Vehicles) -> None:
     """After gains were adapted and the baseline came back: a nose that is far too high, whatever the elevator does."""
-    log = vehicles.log("adaptive_controller")
-    assert "pitch gains: adapted" in log
-    assert "pitch gains: baseline: no estimates for" in log
+    for words in ("pitch gains: adapted", "pitch gains: baseline: no estimates for"):
+        client.until(lambda words=words: words in vehicles.log("adaptive_controller"))  # type: ignore[misc]
     client.flies = False
 
     def said() -> bool:

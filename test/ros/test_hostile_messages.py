@@ -133,7 +133,7 @@ class Nodes:
         for process in self.processes.values():
             process.terminate()
         for module, process in self.processes.items():
-            assert process.wait(timeout=20.0) == (143 if module == "cli" else 0), self.log(module)
+            assert process.wait(timeout=60.0) == (143 if module == "cli" else 0), self.log(module)
             assert "Traceback" not in self.log(module), self.log(module)
 
     def check(self) -> None:
@@ -164,7 +164,7 @@ def damaged(content: bytes, rng: random.Random) -> bytes:
     return bytes(data)
 
 
-EXAMPLES = settings(max_examples=40, deadline=None, database=None)
+EXAMPLES = settings(max_examples=30, deadline=None, database=None)
 
 
 @pytest.mark.parametrize("topic", MESSAGES)
@@ -184,6 +184,12 @@ def test_whatever_is_sent_on_a_topic_no_node_ends(nodes: Nodes, topic: str) -> N
     nodes.check()
 
 
+def sound(message: DerivativeEstimates, after: int) -> bool:
+    """Whether estimates are of a time after a stamp (ns), and not stale."""
+    stale = {one.status for one in message.derivatives} == {"stale input"}
+    return conversion.stamp_ns(message.header.stamp) > after and not stale
+
+
 def test_whatever_is_sent_on_all_topics_a_sound_flight_is_identified_afterwards(nodes: Nodes) -> None:
     @EXAMPLES
     @given(
@@ -200,10 +206,12 @@ def test_whatever_is_sent_on_all_topics_a_sound_flight_is_identified_afterwards(
     nodes.check()
     probe = nodes.probe
     probe.estimates.clear()
-    probe.speak(made_up_streams(6.0))
-    last = START_NS + 5_900_000_000
-    found = probe.until(lambda: [one for one in probe.estimates if conversion.stamp_ns(one.header.stamp) > last])
+    flight, last, found, begin = made_up_streams(60.0), START_NS + 3_900_000_000, [], 0.0
+    while not found and begin < 60.0:  # what a busy machine loses is followed by more
+        probe.speak(flight, start=begin, stop=begin + 0.5)
+        probe.spin(0.1)
+        found, begin = [one for one in probe.estimates if sound(one, last)], begin + 0.5
+    assert found, {name: status.message for name, status in probe.diagnostics.items()}
     # how many came on the way is a matter of queues: the flight is sent as fast as it can be
     assert len(found[0].derivatives) == len(load_aircraft("cdrw").derivatives)
-    assert {one.status for one in found[0].derivatives} != {"stale input"}
     nodes.check()

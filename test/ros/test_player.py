@@ -76,10 +76,8 @@ def test_restamped_all_stamps_move_by_one_constant_to_now(probe: Probe, bag: Pat
     stamps = read_streams(bag).imu.arrival.stamp_ns.tolist()
     heard = [conversion.stamp_ns(message.header.stamp) for message in imu]
     shift = heard[-1] - stamps[-1]
-    # a busy machine may hear the first messages late, or not at all
-    assert len(heard) > 0.9 * len(stamps)
-    assert {stamp - shift for stamp in heard} <= set(stamps)
-    assert abs(START_NS + shift - now) < 30 * 10**9
+    assert [stamp - shift for stamp in heard] == stamps
+    assert abs(START_NS + shift - now) < 60 * 10**9
 
 
 @pytest.mark.parametrize(
@@ -91,7 +89,7 @@ def test_restamped_all_stamps_move_by_one_constant_to_now(probe: Probe, bag: Pat
 )
 def test_bad_input_is_one_line_and_code_2(ros: None, arguments: list[str], words: str) -> None:
     process = start("player", *arguments)
-    text, _ = process.communicate(timeout=20.0)
+    text, _ = process.communicate(timeout=60.0)
     assert process.returncode == 2
     assert words in text
     assert "Traceback" not in text

@@ -2,6 +2,7 @@
 
 import os
 from importlib.util import find_spec
+from time import monotonic
 
 import numpy as np
 import pytest
@@ -60,10 +61,10 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
              "faults": (DiagnosticArray, "fault_monitor/faults")}  # fmt: skip
     publishers = {name: node.create_publisher(kind, topic, 100) for name, (kind, topic) in kinds.items()}
     stream = open_file(scene.declared, path)
-    for _ in range(100):
+    end = monotonic() + 60.0
+    while not all(publisher.get_subscription_count() for publisher in publishers.values()):
+        assert monotonic() < end
         watch.listen(0.05)
-        if all(publisher.get_subscription_count() for publisher in publishers.values()):
-            break
     watch.listen(0.3)
     for at in np.arange(0.0, 2.0, 0.02):
         publish(node, float(at), publishers)

@@ -67,14 +67,28 @@ def weigh(J: Array, v: Array, shift: Shift, excess: float = 1.0) -> Weighed:
 _IMPOSSIBLE = Weighed(-math.inf, np.empty(0), np.empty((0, 0)))
 
 
+class ShiftGroup:
+    """Shifts with the same number m of free directions, more than one, at ``places`` (n,) among all."""
+
+    def __init__(self, places: NDArray[np.intp], shifts: Sequence[Shift]) -> None:
+        self.places = places
+        self.shifts = tuple(shifts)
+        self.free = np.array([shift.free for shift in shifts])  # (n, D, m)
+        self.across = np.ascontiguousarray(self.free.swapaxes(1, 2))  # (n, m, D)
+        self.prior = np.array([shift.spread**-2 for shift in shifts])  # (n, m)
+        self.ridge = 1e-6 * np.eye(self.prior.shape[1])
+
+
 class Shifts:
-    """Many shifts; those with one free direction stand in arrays side by side."""
+    """Many shifts; those with one free direction stand in arrays side by side, the others in groups of one size."""
 
     def __init__(self, shifts: Sequence[Shift]) -> None:
         self.each = tuple(shifts)
         single = [i for i, shift in enumerate(shifts) if shift.spread.size == 1]
         self.single = np.array(single, dtype=np.intp)  # (n,)
-        self.several = [i for i, shift in enumerate(shifts) if shift.spread.size > 1]
+        sizes = np.array([shift.spread.size for shift in shifts])
+        places = [np.flatnonzero(sizes == m) for m in np.unique(sizes[sizes > 1])]
+        self.groups = [ShiftGroup(place, [shifts[i] for i in place.tolist()]) for place in places]
         self.fixed = np.column_stack([shifts[i].fixed for i in single])  # (D, n)
         self.free = np.column_stack([shifts[i].free[:, 0] for i in single])  # (D, n)
         self.freedom = np.array([shift.spread.size for shift in shifts])  # (H,)
@@ -104,10 +118,29 @@ def weigh_each(
     factor += 0.5 * g * g / G - 0.5 * np.log(G / shifts.prior)
     rows = zip(shifts.single.tolist(), factor.tolist(), (g / G)[:, None], (1.0 / G)[:, None, None], strict=True)
     found = {i: Weighed(f, size, covariance) for i, f, size, covariance in rows}
-    for i in shifts.several:
-        wanted = worth is None or worth[i]
-        found[i] = weigh(J, v, shifts.each[i], float(excess[i])) if wanted else _IMPOSSIBLE
-    return [found[i] for i in range(len(shifts.each))]
+    for group in shifts.groups:
+        wanted = np.arange(group.places.size) if worth is None else np.flatnonzero(worth[group.places])
+        if wanted.size:
+            found |= _weigh_group(J, v, group, wanted, excess)
+    return [found.get(i, _IMPOSSIBLE) for i in range(len(shifts.each))]
+
+
+def _weigh_group(J: Array, v: Array, group: ShiftGroup, wanted: NDArray[np.intp], excess: Array) -> dict[int, Weighed]:
+    """``weigh`` for the ``wanted`` shifts of a group, by their places among all."""
+    places, prior = group.places[wanted], group.prior[wanted]
+    G = group.across[wanted] @ J @ group.free[wanted] / excess[places, None, None]
+    diagonal = np.arange(prior.shape[1])
+    G[:, diagonal, diagonal] += prior
+    covariances, freedoms = np.linalg.inv(G), np.linalg.slogdet(G)[1] - np.log(prior).sum(axis=1)
+    found = {}
+    for i, place, covariance, freedom in zip(wanted.tolist(), places.tolist(), covariances, freedoms, strict=True):
+        shift, share = group.shifts[i], float(excess[place])
+        pulled = J @ shift.fixed
+        g = shift.free.T @ (v - pulled) / share
+        size = covariance @ g
+        factor = float(shift.fixed @ v - 0.5 * shift.fixed @ pulled) / share
+        found[place] = Weighed(factor + 0.5 * float(g @ size) - 0.5 * float(freedom), size, covariance)
+    return found
 
 
 def weigh_loosely(J: Array, v: Array, shift: Shift, precision: Array, looseness: Array, excess: float) -> Weighed:
@@ -141,10 +174,10 @@ def score_squares(J: Array, v: Array, shifts: Shifts) -> Array:
     found = np.empty(len(shifts.each))
     information = (shifts.free * (J @ shifts.free)).sum(axis=0)
     found[shifts.single] = (v @ shifts.free) ** 2 / np.maximum(information, 1e-300)
-    for i in shifts.several:
-        B = shifts.each[i].free
-        g, G = v @ B, B.T @ J @ B
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(G), 1e-300))
-        g = g * scale
-        found[i] = float(g @ np.linalg.solve(G * np.outer(scale, scale) + 1e-6 * np.eye(g.size), g)) / g.size
+    for group in shifts.groups:
+        G = group.across @ J @ group.free
+        scale = 1.0 / np.sqrt(np.maximum(G.diagonal(axis1=1, axis2=2), 1e-300))
+        g = (v @ group.free) * scale
+        solved = np.linalg.solve(G * (scale[:, :, None] * scale[:, None, :]) + group.ridge, g[:, :, None])[:, :, 0]
+        found[group.places] = [float(one @ other) / one.size for one, other in zip(g, solved, strict=True)]
     return found

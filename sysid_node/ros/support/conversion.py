@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -12,10 +12,12 @@ from sysid_msgs.msg import EstimateCorrelation, ModelGap
 
 from sysid_node.control.types import ErrorCorrelation
 from sysid_node.online import types
-from sysid_node.online.estimates.covariance import EstimateCovariance
-from sysid_node.online.estimates.model_gap import CoefficientGap
-from sysid_node.online.estimates.servo_gap import ServoGap
 from sysid_node.online.types import Estimates
+
+if TYPE_CHECKING:  # they import the estimator and SciPy, which nodes that only convert do without: they start sooner
+    from sysid_node.online.estimates.covariance import EstimateCovariance
+    from sysid_node.online.estimates.model_gap import CoefficientGap
+    from sysid_node.online.estimates.servo_gap import ServoGap
 
 NANOSECONDS = 1_000_000_000
 

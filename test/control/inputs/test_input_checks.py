@@ -45,7 +45,7 @@ def test_an_aircraft_survives_any_excitation() -> None:
     trim = trim_flight(simulator)
     flight = live.start(simulator, trim, live.LiveConditions(noise=0.0), live.vector(simulator, []))
     state, command, rows = controller.init(AIRCRAFT, ControllerSettings()), trim.command.tolist(), []
-    for k in range(850):
+    for k in range(650):
         now = live.step(simulator, flight, command)
         _, _, _, p, q, r, phi, theta, _, V, alpha, beta = now.outputs.tolist()
         sensed = Measurements(now.time, p, q, r, phi, theta, V, alpha, beta, now.density)

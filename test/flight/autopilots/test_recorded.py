@@ -20,7 +20,7 @@ from sysid_node.online.settings import OnlineSettings as Estimator
 
 JOINTS = "elevator=servo2:0:0.4 aileron=servo1:0:0.4 rudder=servo3:0:0.4 throttle=motor1:0:1"
 CHANNELS = {"aileron": 0, "elevator": 1, "rudder": 2}
-SECONDS = 15.0
+SECONDS = 11.0
 BAG = Path(__file__).resolve().parents[3] / "bags" / "cdrw_multistep"
 
 

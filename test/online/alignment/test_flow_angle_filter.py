@@ -53,6 +53,12 @@ def identify(samples: Array, aircraft: Aircraft = AIRCRAFT) -> Estimates:
     return replay.run(aircraft, OnlineSettings(), time, samples, time[-1:])[0]
 
 
+@cache
+def identified_without_vanes() -> Estimates:
+    """What is identified of the flight with the right file and without flow angles."""
+    return identify(without(flown()[1]))
+
+
 def completed(aircraft: Aircraft, time: Array, samples: Array) -> Array:
     return flow_angle_filter.complete_many(flow_angle_filter.init(aircraft), time, samples, 0.2)
 
@@ -99,7 +105,7 @@ def test_biased_gyros_are_learnt() -> None:
 
 
 def test_estimates_hold_the_truth_and_say_what_is_lost() -> None:
-    found = identify(without(flown()[1])).derivatives
+    found = identified_without_vanes().derivatives
     for name, d in found.items():
         if name.startswith("CD") or name.endswith("_0"):
             assert (d.valid, d.status) == (False, "flow angle not measured")
@@ -111,8 +117,7 @@ def test_estimates_hold_the_truth_and_say_what_is_lost() -> None:
 @pytest.mark.parametrize("name", ["CL_0", "CL_alpha", "CL_de", "CY_beta", "CY_dr"])
 def test_a_wrong_file_moves_estimates_by_less_than_their_errors_say(name: str) -> None:
     """Moved by one tolerance of the file, no estimate moves by more than the standard error that counts it."""
-    blind = without(flown()[1])
-    right, moved = (identify(blind, aircraft).derivatives for aircraft in (AIRCRAFT, wrong(name, 1.0)))
+    right, moved = identified_without_vanes().derivatives, identify(without(flown()[1]), wrong(name, 1.0)).derivatives
     for of, d in right.items():
         if d.status not in ("flow angle not measured", "contradicted"):
             assert abs(d.value - moved[of].value) < d.standard_error, of
@@ -132,7 +137,7 @@ def test_gusts_hide_the_angle_of_attack() -> None:
     assert not any(d.valid for name, d in found.items() if name[:2] in ("CL", "CD", "Cm"))
 
 
-@pytest.mark.parametrize("columns", [(ALPHA,), (BETA,), (ALPHA, BETA)])
+@pytest.mark.parametrize("columns", [(BETA,), (ALPHA, BETA)])
 def test_a_record_at_once_equals_its_samples_one_by_one(columns: tuple[int, ...]) -> None:
     """With a gap, a column that fails for a while, and a sample that comes too early."""
     time, samples = flown()
@@ -149,7 +154,7 @@ def test_a_record_at_once_equals_its_samples_one_by_one(columns: tuple[int, ...]
 @pytest.mark.parametrize(("column", "reading"), [(9, 5e-324), (9, 0.0), (6, 1e200), (0, 1e200), (3, -1e200)])
 def test_readings_of_no_flight_are_none(column: int, reading: float) -> None:
     time, samples = flown()
-    samples = without(samples)
+    time, samples = time[:800], without(samples[:800])
     for place in (0, 700):
         samples[place, column] = reading
     made = completed(AIRCRAFT, time, samples)[:, ANGLES]

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 AIRCRAFT = made_aircraft()
 ELEVATOR = ("CL_de", "CD_de", "Cm_de")
 RATE, LOST_AT = 100.0, 30.0
+MOMENTS = np.arange(5.0, LOST_AT + 4.5, 0.5)  # s, at which the estimates are looked at
 EQUATIONS = normal_equations.normal_equations({"Cm": ("0", "alpha", "de")}, SignalLayout(("alpha", "de"), ("de",), ()))
 
 
@@ -38,47 +39,39 @@ def announced(history: list[Estimates]) -> list[float]:
 
 @cache
 def with_half_the_elevator(gusts: float, closed_loop: bool) -> tuple[Array, Array]:
-    """Six flights, flown once for both methods."""
+    """Three flights, flown once for both methods."""
     after = (LOST_AT, dict.fromkeys(ELEVATOR, 0.5))
-    commands = multisteps(36.0, RATE, seed=6)
-    return fly(AIRCRAFT, commands, RATE, 6, seed=3, gusts=gusts, closed_loop=closed_loop, after=after)
+    commands = multisteps(LOST_AT + 4.5, RATE, seed=6)
+    return fly(AIRCRAFT, commands, RATE, 3, seed=3, gusts=gusts, closed_loop=closed_loop, after=after)
 
 
 @pytest.mark.parametrize(
     ("gusts", "closed_loop", "method"),
     [
         (0.0, False, "iv_rft"),
-        (0.7, True, "iv_rft"),
         (1.5, True, "iv_rft"),
         (0.7, True, "sls_rft"),
-        (1.5, True, "sls_rft"),
     ],
 )
 def test_half_the_elevator_is_lost(gusts: float, closed_loop: bool, method: str) -> None:
-    """Half its effectiveness gone at 30 s: announced by 34 s in five of six flights, Cm_de then right in 15 %."""
+    """Half its effectiveness gone at 30 s: announced by 34 s in every flight, Cm_de then right in 15 %."""
     time, flights = with_half_the_elevator(gusts, closed_loop)
-    noticed = 0
     for samples in flights:
-        history = run(AIRCRAFT, OnlineSettings(method=method), time, samples, np.arange(5.0, 36.0, 0.25))
+        history = run(AIRCRAFT, OnlineSettings(method=method), time, samples, MOMENTS)
         times = announced(history)
-        assert not times or times[0] > LOST_AT
-        if times and times[0] <= LOST_AT + 4.0:
-            noticed += 1
-            later = next(e for e in history if e.time >= LOST_AT + 4.0).derivatives["Cm_de"]
-            assert later.value == pytest.approx(0.5 * TRUTH["Cm_de"], rel=0.15)
-    assert noticed >= 5
+        assert times and LOST_AT < times[0] <= LOST_AT + 4.0
+        later = next(e for e in history if e.time >= LOST_AT + 4.0).derivatives["Cm_de"]
+        assert later.value == pytest.approx(0.5 * TRUTH["Cm_de"], rel=0.15)
 
 
-@pytest.mark.parametrize(("gusts", "method"), [(0.7, "iv_rft"), (1.5, "sls_rft")])
+@pytest.mark.parametrize(("gusts", "method"), [(1.5, "iv_rft"), (0.7, "sls_rft")])
 def test_servos_of_unknown_time_do_not_hide_that_half_the_elevator_is_lost(gusts: float, method: str) -> None:
-    """The servos' estimated times move with most renewals: announced by 34 s in five of six flights all the same."""
+    """The servos' estimated times move with most renewals: announced by 34 s in every flight all the same."""
     time, flights = with_half_the_elevator(gusts, True)
-    silent, noticed = replace(AIRCRAFT, ideal=False), 0
-    for samples in flights:
-        times = announced(run(silent, OnlineSettings(method=method), time, samples, np.arange(5.0, 36.0, 0.25)))
-        assert not times or times[0] > LOST_AT
-        noticed += bool(times) and times[0] <= LOST_AT + 4.0
-    assert noticed >= 5
+    silent = replace(AIRCRAFT, ideal=False)
+    for samples in flights[:2]:
+        times = announced(run(silent, OnlineSettings(method=method), time, samples, MOMENTS))
+        assert times and LOST_AT < times[0] <= LOST_AT + 4.0
 
 
 def known(time: float, theta: float) -> ReferenceEstimates:
@@ -146,7 +139,7 @@ def test_estimates_are_tested_with_the_servos_with_which_they_were_made() -> Non
 def test_no_estimate_is_valid_and_far_off_once_a_change_has_shown(changed: dict[str, float], key: str) -> None:
     """Noticed or not: from 36 s on under 2 % of the valid estimates of the changed derivative are > 4 s.e. off."""
     after = (LOST_AT, changed)
-    time, flights = fly(AIRCRAFT, multisteps(42.0, RATE, seed=6), RATE, 3, seed=3, gusts=0.7, after=after)
+    time, flights = fly(AIRCRAFT, multisteps(42.0, RATE, seed=6), RATE, 2, seed=3, gusts=0.7, after=after)
     truth = TRUTH[key] * changed[key]
     histories = [run(AIRCRAFT, OnlineSettings(), time, samples, np.arange(36.0, 42.0, 0.25)) for samples in flights]
     valid = [d for history in histories for d in (e.derivatives[key] for e in history) if d.valid]
@@ -156,11 +149,11 @@ def test_no_estimate_is_valid_and_far_off_once_a_change_has_shown(changed: dict[
 
 def test_estimates_of_quiet_flight_are_learned_anew_without_a_change_being_announced() -> None:
     """Still air, only the autopilot's answers to its sensors' noise, then the first manoeuvre: it may contradict."""
-    commands = multisteps(40.0, RATE)
+    commands = multisteps(30.0, RATE)
     commands[: round(20.0 * RATE)] = 0.0
-    time, flights = fly(AIRCRAFT, commands, RATE, 3, seed=7, gusts=0.3)
+    time, flights = fly(AIRCRAFT, commands, RATE, 2, seed=7, gusts=0.3)
     for samples in flights:
-        history = run(AIRCRAFT, OnlineSettings(), time, samples, np.arange(5.0, 40.0, 0.25))
+        history = run(AIRCRAFT, OnlineSettings(), time, samples, np.arange(5.0, 30.0, 0.5))
         assert announced(history) == []
         assert history[-1].derivatives["Cm_de"].valid
         assert history[-1].derivatives["Cm_de"].value == pytest.approx(TRUTH["Cm_de"], rel=0.1)
@@ -169,7 +162,7 @@ def test_estimates_of_quiet_flight_are_learned_anew_without_a_change_being_annou
 def test_what_a_change_leaves_behind_is_forgotten() -> None:
     """Ten seconds later nothing of the old aircraft is in the estimates; without detection it still is."""
     after = (LOST_AT, dict.fromkeys(ELEVATOR, 0.5))
-    time, flights = fly(AIRCRAFT, multisteps(42.0, RATE), RATE, 1, seed=5, gusts=0.7, after=after)
+    time, flights = fly(AIRCRAFT, multisteps(LOST_AT + 12.0, RATE), RATE, 1, seed=5, gusts=0.7, after=after)
     watched, blind = (
         run(AIRCRAFT, OnlineSettings(method="sls_rft", detect_changes=detect), time, flights[0], time[-1:])[
             0
@@ -184,20 +177,18 @@ def test_what_a_change_leaves_behind_is_forgotten() -> None:
 def test_a_memory_that_fades_forgets_a_change_as_well() -> None:
     """Three seconds after the elevator's loss the lines hold the new aircraft alone: one model explains them."""
     after = (LOST_AT, dict.fromkeys(ELEVATOR, 0.5))
-    time, flights = fly(AIRCRAFT, multisteps(33.0, RATE), RATE, 1, seed=5, after=after)
+    time, flights = fly(AIRCRAFT, multisteps(LOST_AT + 3.0, RATE), RATE, 1, seed=5, after=after)
     fading = OnlineSettings(method="sls_rft", forgetting_time=10.0)
     assert run(AIRCRAFT, fading, time, flights[0], time[-1:])[0].fits["Cm"].r_squared > 0.97
 
 
 @pytest.mark.parametrize("gusts", [0.0, 1.5])
 def test_no_change_is_announced_in_unchanged_flight(gusts: float) -> None:
-    """Three flights of a minute, autopilot in the loop; the bench over hours stands apart."""
-    time, flights = fly(AIRCRAFT, multisteps(60.0, RATE, seed=9), RATE, 3, seed=11, gusts=gusts)
-    for method in METHODS:
-        for samples in flights:
-            assert (
-                announced(run(AIRCRAFT, OnlineSettings(method=method), time, samples, np.arange(1.0, 60.0, 0.5))) == []
-            )
+    """A flight of a minute by each method, autopilot in the loop; the bench over hours stands apart."""
+    time, flights = fly(AIRCRAFT, multisteps(60.0, RATE, seed=9), RATE, len(METHODS), seed=11, gusts=gusts)
+    for method, samples in zip(METHODS, flights, strict=True):
+        history = run(AIRCRAFT, OnlineSettings(method=method), time, samples, np.arange(1.0, 60.0, 0.5))
+        assert announced(history) == []
 
 
 def test_flight_that_the_model_does_not_explain_is_outside_it() -> None:

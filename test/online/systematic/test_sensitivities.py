@@ -80,13 +80,10 @@ def test_sensitivities_are_those_of_the_estimator(key):
     assert state.model.imperfections is not None and state.latest is not None and state.latest.systematic is not None
     place = state.model.imperfections.keys.index(key)
     jacobian = state.latest.systematic.considered.jacobian[place].reshape(-1)[state.model.table.place]
-    ends = []
-    for by in (-step, step):
-        changed = samples.copy()
-        change(changed, by)
-        ends.append(slopes_and_offsets(identified(EXACT, changed)))
-    difference = (ends[1] - ends[0]) / (2.0 * step)
-    size = np.abs(ends[0]) / step * 1e-3 + 0.02 * np.abs(difference).max()
+    changed = samples.copy()
+    change(changed, step)
+    difference = (slopes_and_offsets(identified(EXACT, changed)) - unchanged()) / step
+    size = np.abs(unchanged()) / step * 1e-3 + 0.02 * np.abs(difference).max()
     assert np.all(np.abs(jacobian - difference) < 0.05 * np.abs(difference) + size)
 
 
@@ -112,6 +109,12 @@ def slopes_and_offsets(state: EstimatorState) -> np.ndarray:
     return np.array([d.value for d in estimate(state).derivatives.values()])
 
 
+@cache
+def unchanged() -> np.ndarray:
+    """The estimates from the flight as it is: differences to them are accurate enough, as the steps are small."""
+    return slopes_and_offsets(identified(EXACT, flown()[1]))
+
+
 def test_the_imus_place_is_counted():
     """The estimates with the IMU 1 cm off against the sensitivity, by the aircraft file."""
     _, samples = flown()
@@ -119,11 +122,8 @@ def test_the_imus_place_is_counted():
     assert state.latest is not None and state.latest.systematic is not None and state.model.imperfections is not None
     place = state.model.imperfections.keys.index("sensors.imu.x")
     jacobian = state.latest.systematic.considered.jacobian[place].reshape(-1)[state.model.table.place]
-    moved = [
-        slopes_and_offsets(identified(replace(EXACT, sensors=Sensors(imu=(by, 0.0, 0.0))), samples))
-        for by in (-0.01, 0.01)
-    ]
-    difference = (moved[1] - moved[0]) / 0.02
+    moved = slopes_and_offsets(identified(replace(EXACT, sensors=Sensors(imu=(0.01, 0.0, 0.0))), samples))
+    difference = (moved - unchanged()) / 0.01
     assert np.all(np.abs(jacobian - difference) < 0.05 * np.abs(difference) + 0.02 * np.abs(difference).max())
 
 
