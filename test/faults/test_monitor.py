@@ -96,7 +96,7 @@ def test_damage_names_the_derivatives_that_changed() -> None:
 def test_a_surface_is_never_called_damage(seed: int, truth: Truth) -> None:
     """Not even in the first moments, in which an axis's dozen derivatives would explain them as well."""
     state, maker = flown(seed)
-    for _ in range(40):
+    for _ in range(80):
         fault = fly(state, maker, PERIOD, truth)
         assert fault is None or fault.kind != DAMAGE, fault.text
     assert fault is not None
@@ -243,7 +243,7 @@ def commanded(seed: int, lateness: float, error: float = 0.006) -> tuple[Monitor
 def test_a_servo_that_becomes_slower_is_named_by_how_much(slower: float) -> None:
     state, maker = commanded(21, 0.03)
     maker.lateness["elevator"] += slower
-    fault = fly(state, maker, 6.0)
+    fault = fly(state, maker, 10.0)
     assert fault is not None
     assert (fault.kind, fault.part, fault.unit) == (SLOWER, "elevator", "s"), fault.text
     assert fault.lower <= slower <= fault.upper
