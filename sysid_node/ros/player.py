@@ -7,7 +7,7 @@ import importlib
 import struct
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from rclpy.utilities import remove_ros_args
 from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
+from sysid_node.errors import InputError
 from sysid_node.flight.bag.reader import open_bag, reading
 from sysid_node.flight.commands import COMMANDS, POSITIONS
 from sysid_node.ros.support.conversion import NANOSECONDS, stamp_message
@@ -109,6 +110,13 @@ def recorded(bag: Reader, path: Path) -> Iterator[tuple[str, int, bytes]]:
             yield connection.topic, log_ns, raw
 
 
+def _refuse_unknown(topics: Sequence[str], known: Collection[str], path: Path) -> None:
+    """Raise InputError where a topic is not in the bag: nobody would be waited for."""
+    unknown = [topic for topic in topics if topic not in known]
+    if unknown:
+        raise InputError(f"--wait-for {unknown[0]}: not in {path}, which holds {', '.join(sorted(known))}")
+
+
 def _message_class(type_name: str) -> Any:
     """The class of ``package/msg/Name``, None where its package is not installed."""
     package, _, name = type_name.partition("/msg/")
@@ -142,7 +150,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--restamp", action="store_true", help="move all stamps by one constant, to now")
     parser.add_argument("--clock", action="store_true", help="publish /clock, for nodes with use_sim_time")
     parser.add_argument("--wait", type=float, default=5.0, help="longest wait for listeners, s (5)")
-    parser.add_argument("--wait-for", metavar="TOPIC", nargs="+", default=[], help="whose listeners (all topics)")
+    parser.add_argument(
+        "--wait-for", metavar="TOPIC", nargs="+", default=[], help="wait for listeners of these topics alone"
+    )
     return parser
 
 
@@ -152,7 +162,9 @@ def main() -> None:
 
     def play() -> None:
         with open_bag(options.bag) as bag:
-            player = Player({connection.topic: connection.msgtype for connection in bag.connections}, options.clock)
+            recorded_types = {connection.topic: connection.msgtype for connection in bag.connections}
+            _refuse_unknown(options.wait_for, recorded_types, options.bag)
+            player = Player(recorded_types, options.clock)
             player.await_listeners(options.wait, options.wait_for)
             count = player.play(recorded(bag, options.bag), options.rate, options.restamp)
             player.get_logger().info(f"played {count} messages of {options.bag}")

@@ -13,7 +13,7 @@ def test_a_second_clock_is_said(probe: Probe) -> None:
         assert "/clock" not in state(probe)
         other = probe.node.create_publisher(Clock, "/clock", 10)
         try:
-            probe.until(lambda: "/clock: 2 publish it" in state(probe))
+            probe.until(lambda: "/clock: 2 nodes publish it" in state(probe))
         finally:
             probe.node.destroy_publisher(other)
         probe.until(lambda: "/clock" not in state(probe))

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
-from harness import START_NS, Probe, ended, start
+from harness import ROOT, START_NS, Probe, ended, start
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.qos import QoSProfile
@@ -85,6 +85,7 @@ def test_restamped_all_stamps_move_by_one_constant_to_now(probe: Probe, bag: Pat
     [
         (["nowhere"], "bag nowhere: does not exist in "),
         (["--rate", "0", "nowhere"], "expected a number over zero"),
+        ([str(ROOT / "bags" / "cdrw_random"), "--wait-for", "/imu"], "--wait-for /imu: not in "),
     ],
 )
 def test_bad_input_is_one_line_and_code_2(ros: None, arguments: list[str], words: str) -> None:

@@ -56,10 +56,10 @@ def _symbol(name: str, control: DocumentEntry, symbol: DocumentEntry | None) -> 
     standard = CONTROL_SYMBOLS.get(name)
     if symbol is None:
         if standard is None:
-            known = ", ".join((*CONTROL_SYMBOLS, "throttle"))
-            named = next((control for control, symbol in CONTROL_SYMBOLS.items() if symbol == name), name)
+            names = ", ".join((*CONTROL_SYMBOLS, "throttle"))
+            named = next((known for known, its_symbol in CONTROL_SYMBOLS.items() if its_symbol == name), name)
             hint = did_you_mean(named, (*CONTROL_SYMBOLS, "throttle"))
-            raise control.error(f"not one of {known}{hint}; a further control needs a symbol, e.g. symbol: df")
+            raise control.error(f"not one of {names}{hint}; a further control needs a symbol, e.g. symbol: df")
         return standard
     text = symbol.text("a symbol, e.g. df")
     if standard is not None and text != standard:

@@ -51,7 +51,7 @@ def maximise_likelihood(problem: LikelihoodProblem, search: SearchOptions) -> tu
         moved = float(np.linalg.norm(problem.jacobian(z, noise) @ (z - previous)))
         if moved < search.tolerance and evaluations == search.evaluations:
             return z, iteration, ""
-        # A round of few evaluations may have found no step at all. Where one did, the next would as well.
+        # A round of few evaluations may find no step at all. The next one would find none either.
         evaluations = search.evaluations if moved < search.tolerance else evaluations
     return (
         z,

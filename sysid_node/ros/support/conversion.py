@@ -14,7 +14,7 @@ from sysid_node.control.types import ErrorCorrelation
 from sysid_node.online import types
 from sysid_node.online.types import Estimates
 
-if TYPE_CHECKING:  # they import the estimator and SciPy, which nodes that only convert do without: they start sooner
+if TYPE_CHECKING:  # these modules load SciPy, without which a node that only converts messages starts sooner
     from sysid_node.online.estimates.covariance import EstimateCovariance
     from sysid_node.online.estimates.model_gap import CoefficientGap
     from sysid_node.online.estimates.servo_gap import ServoGap

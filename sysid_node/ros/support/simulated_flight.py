@@ -181,12 +181,12 @@ class FlightSimulator(LoopNode):
         return DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK, line, values
 
     def conditions(self) -> Mapping[str, str]:
-        """A flight that has diverged, commands that are refused, and a clock that is another's, too."""
+        """A flight that has diverged, commands that are refused, and other nodes that publish /clock."""
         refusal, self._refusal = self._refusal, ""
         present = {"flight": self._diverged_words()} if self._diverged else {}
         clocks = self.count_publishers("/clock") if self._sim_time is not None else 1
         if clocks > 1:
-            present["/clock"] = f"{clocks} publish it; fly with speed 1, or give each its own ROS_DOMAIN_ID"
+            present["/clock"] = f"{clocks} nodes publish it; fly with speed 1, or give each its own ROS_DOMAIN_ID"
         return present | ({self.inputs[COMMAND].name: refusal} if refusal else {})
 
     def _diverged_words(self) -> str:
