@@ -47,7 +47,7 @@ def evidence_of(
     ``by_tolerances`` (nats) is what the derivatives' joint prior says for it, of which no more counts than the log
     Bayes factor, in which the effect's own prior is.
     """
-    flexible = effect in thresholds.calibration.flexible_effects
+    flexible = is_flexible(effect, thresholds)
     prior = max(min(by_tolerances, log_bayes_factor), 0.0)
     return CauseEvidence(log_bayes_factor, misspecification_of(tested, thresholds), flexible, windows, prior, searched)
 
@@ -90,10 +90,14 @@ def regressors(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> 
     return 1.0, float(np.log(max(scaled, 1.0))), float(evidence.flexible)
 
 
+def is_flexible(effect: str, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Whether an effect acts as other values of the derivatives, so that it can imitate other effects."""
+    return effect in thresholds.calibration.flexible_effects
+
+
 def prior_odds(effect: str, thresholds: Thresholds = THRESHOLDS) -> float:
     """Odds of an effect before any flight, relative to an effect that is not flexible."""
-    limits = thresholds.calibration
-    return float(np.exp(limits.flexible)) if effect in limits.flexible_effects else 1.0
+    return float(np.exp(thresholds.calibration.flexible)) if is_flexible(effect, thresholds) else 1.0
 
 
 def probability_by_support(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> float:

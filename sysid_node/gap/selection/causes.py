@@ -25,6 +25,8 @@ from sysid_node.gap.selection.calibration import (
     CauseEvidence,
     calibrated_probability,
     evidence_of,
+    is_flexible,
+    is_supported_but_misspecified,
     prior_odds,
     probability_by_support,
 )
@@ -113,13 +115,16 @@ def select_causes(
 
     ``chosen`` is the explanation of the forward selection with its ``stages``; candidates that are ``always`` tried
     are alternatives to any cause. ``base`` has nuisances only. What was ``rejected_before`` does not come back.
+
+    A flexible effect imitates others. Where one of these is well supported, but its equation is wrong, the flexible
+    effect explains what is there no better than before: it is not more probable because a likelier effect was rejected.
     """
     rejected = list(rejected_before)
     challenged: frozenset[str] = frozenset()
     while True:
         excluded = frozenset(cause.candidate.label for cause in rejected)
         chosen, positions = replace_stepwise(fitter, base, chosen, stages, always, excluded | challenged)
-        causes = [_weighed(fitter, base, chosen, position, excluded) for position in positions]
+        causes = [_weighed(fitter, base, chosen, position, rejected) for position in positions]
         challenge = next_challenge([cause.table for cause in causes], challenged)
         if challenge is None:
             causes = [_with_late_imu(cause, chosen) for cause in causes]
@@ -144,7 +149,8 @@ def _with_late_imu(cause: Cause, chosen: FittedSet) -> Cause:
 def _successor(base: FittedSet, position: CauseAlternatives, cause: Cause, barred: frozenset[str]) -> FittedSet | None:
     """The explanation with the alternative that takes a challenged cause's place; none where there is none."""
     shares = dict(cause.alternatives)
-    scores = [_Successor(base, position.without, each, shares) for each in position.alternatives if each.added]
+    imitated = is_supported_but_misspecified(cause.evidence)
+    scores = [_Successor(base, position.without, each, shares, imitated) for each in position.alternatives if each.added]
     found = successor(scores, barred)
     return None if found is None else scores[found].fitted
 
@@ -157,6 +163,7 @@ class _Successor:
     without: FittedSet
     fitted: FittedSet
     shares: dict[str, float]
+    imitated: bool  # whether a flexible effect may imitate the cause, whose equation is wrong
 
     @property
     def added(self) -> Candidate:
@@ -181,7 +188,8 @@ class _Successor:
 
     @cached_property
     def probability(self) -> float:
-        return calibrated_probability(_evidence(self.fitted, self.without, self.added))
+        share = self.share if self.imitated and is_flexible(self.added.effect) else 1.0
+        return share * calibrated_probability(_evidence(self.fitted, self.without, self.added))
 
 
 def _evidence(fitted: FittedSet, without: FittedSet, candidate: Candidate) -> CauseEvidence:
@@ -194,16 +202,17 @@ def _evidence(fitted: FittedSet, without: FittedSet, candidate: Candidate) -> Ca
 
 
 def _weighed(
-    fitter: CandidateFitter, base: FittedSet, chosen: FittedSet, position: CauseAlternatives, excluded: frozenset[str]
+    fitter: CandidateFitter, base: FittedSet, chosen: FittedSet, position: CauseAlternatives, rejected: Sequence[Cause]
 ) -> Cause:
     """A cause with its share of the probability, summed over all sets of effects that were fitted with it.
 
     An alternative counts only as far as it does not predict still better beside the cause: effects that add up are no
     alternatives (Hoeting, Madigan, Raftery & Volinsky (1999), Statistical Science 14(4), eq. 1, over sets).
-    Alternatives whose labels are ``excluded`` are left out, and so are those that explain nothing that matters.
+    Alternatives that were ``rejected`` are left out, unless the cause may imitate them, and so are those that explain
+    nothing that matters.
     """
     candidate, without = position.candidate, position.without
-    left_out = excluded | {candidate.label}
+    left_out = {candidate.label, *(each.candidate.label for each in rejected if not _may_imitate(candidate, each))}
     known = [each for each in position.alternatives if each.added and each.added.label not in left_out]
     in_its_place = zip(known, _shares([chosen], known)[1:], strict=True)
     strong = [each for each, share in in_its_place if share > THRESHOLDS.search.tried_beside]
@@ -226,6 +235,11 @@ def _weighed(
         without=without,
         plausible=is_plausible(Comparison(base, without, replace(chosen, added=candidate))),
     )
+
+
+def _may_imitate(candidate: Candidate, rejected: Cause) -> bool:
+    """Whether a candidate is flexible, and may explain what is there in place of a cause whose equation is wrong."""
+    return is_flexible(candidate.effect) and is_supported_but_misspecified(rejected.evidence)
 
 
 def _shares(sets: Sequence[FittedSet], others: Sequence[FittedSet]) -> Array:
