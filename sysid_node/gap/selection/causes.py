@@ -40,6 +40,7 @@ from sysid_node.gap.selection.retention import (
     next_challenge,
     shares_by_effect,
     successor,
+    without_rejected,
 )
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS
@@ -62,6 +63,7 @@ class Cause:
     without: FittedSet  # the explanation without it
     replaced: bool = False  # whether a probable alternative took its place
     plausible: bool = True  # whether real parts are off as far as it is in this explanation
+    imitated: float = 0.0  # share of rejected effects that it may only imitate, before the other shares
 
     @property
     def probability(self) -> float:
@@ -71,13 +73,13 @@ class Cause:
     @property
     def probability_of_any(self) -> float:
         """Probability that it, or an alternative named with it, is there; zero where its size is not plausible."""
-        return calibrated_probability(self.evidence) if self.plausible else 0.0
+        return calibrated_probability(self.evidence) * (1.0 - self.imitated) if self.plausible else 0.0
 
     @property
     def table(self) -> CauseTable:
         """The scores that decide whether it is kept."""
         largest = max((share for _, share in self.alternatives), default=0.0)
-        by_support = probability_by_support(self.evidence) if self.plausible else 0.0
+        by_support = probability_by_support(self.evidence) * (1.0 - self.imitated) if self.plausible else 0.0
         return CauseTable(self.candidate.label, self.share, largest, self.probability_of_any, by_support)
 
 
@@ -150,7 +152,9 @@ def _successor(base: FittedSet, position: CauseAlternatives, cause: Cause, barre
     """The explanation with the alternative that takes a challenged cause's place; none where there is none."""
     shares = dict(cause.alternatives)
     imitated = is_supported_but_misspecified(cause.evidence)
-    scores = [_Successor(base, position.without, each, shares, imitated) for each in position.alternatives if each.added]
+    scores = [
+        _Successor(base, position.without, each, shares, imitated) for each in position.alternatives if each.added
+    ]
     found = successor(scores, barred)
     return None if found is None else scores[found].fitted
 
@@ -208,8 +212,8 @@ def _weighed(
 
     An alternative counts only as far as it does not predict still better beside the cause: effects that add up are no
     alternatives (Hoeting, Madigan, Raftery & Volinsky (1999), Statistical Science 14(4), eq. 1, over sets).
-    Alternatives that were ``rejected`` are left out, unless the cause may imitate them, and so are those that explain
-    nothing that matters.
+    Alternatives that were ``rejected`` are left out, and so are those that explain nothing that matters; but what the
+    cause may imitate takes its share.
     """
     candidate, without = position.candidate, position.without
     left_out = {candidate.label, *(each.candidate.label for each in rejected if not _may_imitate(candidate, each))}
@@ -224,6 +228,7 @@ def _weighed(
     effects = [each.added.effect for each in fitted if each.added]
     odds = [*[prior_odds(candidate.effect)] * len(sets), *(prior_odds(effect) for effect in effects), 1.0]
     share, alternatives = shares_by_effect(candidate.effect, effects, _shares(sets, [*fitted, without]), np.array(odds))
+    imitated, share, alternatives = without_rejected(share, alternatives, _rejected_effects(fitted, rejected))
     return Cause(
         candidate=candidate,
         share=share,
@@ -234,7 +239,16 @@ def _weighed(
         alternative_sets=position.alternatives,
         without=without,
         plausible=is_plausible(Comparison(base, without, replace(chosen, added=candidate))),
+        imitated=imitated,
     )
+
+
+def _rejected_effects(fitted: Sequence[FittedSet], rejected: Sequence[Cause]) -> frozenset[str]:
+    """Effects that were fitted in a cause's place only by candidates that were rejected."""
+    labels = {cause.candidate.label for cause in rejected}
+    by_label = {each.added.label: each.added.effect for each in fitted if each.added}
+    others = {effect for label, effect in by_label.items() if label not in labels}
+    return frozenset(effect for label, effect in by_label.items() if label in labels) - others
 
 
 def _may_imitate(candidate: Candidate, rejected: Cause) -> bool:

@@ -20,7 +20,7 @@ Fitted = tuple[CandidateFitter, FittedSet, dict[str, Candidate]]
 @pytest.fixture(scope="module")
 def late(aircraft) -> Fitted:
     """A flight with commands 0.1 s late: its fitter, nuisances alone, and some candidates by label."""
-    wanted = ("command_delay", "actuator_lag", "thrust_scale", "stuck_surface of elevator")
+    wanted = ("command_delay", "actuator_lag", "thrust_scale", "stuck_surface of elevator", "inertia_error")
     return _fitted(aircraft, {"command_delay": {"delay": 0.1}}, 14, wanted)
 
 

@@ -36,6 +36,37 @@ def test_what_was_doubted_before_does_not_come_back(selected, late) -> None:
     assert "command_delay" not in chosen.fit.effects | {each.candidate.effect for each in causes}
 
 
+def rejected_for_its_equation(fitted):
+    """Late commands, as if their equation had been found wrong: well supported, and rejected."""
+    fitter, base, candidates = fitted
+    commands = fitter.add_candidate(base, candidates["command_delay"])
+    _, (cause,), _ = select_causes(fitter, base, commands, [[commands]], [])
+    return replace(cause, evidence=replace(cause.evidence, misspecification=1.0))
+
+
+@pytest.mark.parametrize(("supported", "kept"), [(True, set()), (False, {"inertia_error"})])
+def test_a_flexible_effect_is_not_more_probable_because_what_it_imitates_was_rejected(late, supported, kept) -> None:
+    """Truth: late commands, which inertias that are off may imitate in a part. What hardly was a cause is none."""
+    fitter, base, candidates = late
+    cause = rejected_for_its_equation(late)
+    if not supported:
+        cause = replace(cause, evidence=replace(cause.evidence, log_bayes_factor=0.0, by_tolerances=0.0))
+    imitator = fitter.add_candidate(base, candidates["inertia_error"])
+    stage = [imitator, fitter.add_candidate(base, candidates["command_delay"])]
+    chosen, causes, _ = select_causes(fitter, base, imitator, [stage], [], [cause])
+    assert chosen.fit.effects == {each.candidate.effect for each in causes} == kept
+
+
+def test_what_is_there_besides_is_no_imitation(mistaken) -> None:
+    """Truth: late commands, and a centre of gravity that is off. Together they predict best."""
+    fitter, base, candidates = mistaken
+    shift = fitter.add_candidate(base, candidates["cg_shift"])
+    stage = [shift, fitter.add_candidate(base, candidates["command_delay"])]
+    _, causes, rejected = select_causes(fitter, base, shift, [stage], [], [rejected_for_its_equation(mistaken)])
+    (cause,) = (each for each in (*causes, *rejected) if each.candidate.effect == "cg_shift")
+    assert cause.imitated < 1e-6
+
+
 def test_its_probability_is_its_share_of_the_calibrated_one(selected) -> None:
     _, (cause,), _ = selected
     assert cause.share > 0.95 and cause.share + sum(p for _, p in cause.alternatives) <= 1.0 + 1e-12
