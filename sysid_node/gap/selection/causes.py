@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import expit
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit
@@ -40,7 +41,6 @@ from sysid_node.gap.selection.retention import (
     next_challenge,
     shares_by_effect,
     successor,
-    without_rejected,
 )
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim import EFFECTS
@@ -63,7 +63,7 @@ class Cause:
     without: FittedSet  # the explanation without it
     replaced: bool = False  # whether a probable alternative took its place
     plausible: bool = True  # whether real parts are off as far as it is in this explanation
-    imitated: float = 0.0  # share of rejected effects that it may only imitate, before the other shares
+    imitated: float = 0.0  # probability that it only imitates an effect that was rejected for its equation
 
     @property
     def probability(self) -> float:
@@ -118,8 +118,8 @@ def select_causes(
     ``chosen`` is the explanation of the forward selection with its ``stages``; candidates that are ``always`` tried
     are alternatives to any cause. ``base`` has nuisances only. What was ``rejected_before`` does not come back.
 
-    A flexible effect imitates others. Where one of these is well supported, but its equation is wrong, the flexible
-    effect explains what is there no better than before: it is not more probable because a likelier effect was rejected.
+    A flexible effect imitates others. Where one of these was rejected because its equation is wrong, but what the
+    commands predict supports it more, the flexible effect is not more probable than it was beside it.
     """
     rejected = list(rejected_before)
     challenged: frozenset[str] = frozenset()
@@ -151,10 +151,8 @@ def _with_late_imu(cause: Cause, chosen: FittedSet) -> Cause:
 def _successor(base: FittedSet, position: CauseAlternatives, cause: Cause, barred: frozenset[str]) -> FittedSet | None:
     """The explanation with the alternative that takes a challenged cause's place; none where there is none."""
     shares = dict(cause.alternatives)
-    imitated = is_supported_but_misspecified(cause.evidence)
-    scores = [
-        _Successor(base, position.without, each, shares, imitated) for each in position.alternatives if each.added
-    ]
+    wrong = cause.fit if is_supported_but_misspecified(cause.evidence) else None
+    scores = [_Successor(base, position.without, each, shares, wrong) for each in position.alternatives if each.added]
     found = successor(scores, barred)
     return None if found is None else scores[found].fitted
 
@@ -167,7 +165,7 @@ class _Successor:
     without: FittedSet
     fitted: FittedSet
     shares: dict[str, float]
-    imitated: bool  # whether a flexible effect may imitate the cause, whose equation is wrong
+    wrong: CandidateFit | None  # the explanation with the cause, where its equation is wrong: what may be imitated
 
     @property
     def added(self) -> Candidate:
@@ -192,8 +190,10 @@ class _Successor:
 
     @cached_property
     def probability(self) -> float:
-        share = self.share if self.imitated and is_flexible(self.added.effect) else 1.0
-        return share * calibrated_probability(_evidence(self.fitted, self.without, self.added))
+        imitated = 0.0
+        if self.wrong is not None and is_flexible(self.added.effect):
+            imitated = _probability_against(self.fitted.fit, self.wrong)
+        return (1.0 - imitated) * calibrated_probability(_evidence(self.fitted, self.without, self.added))
 
 
 def _evidence(fitted: FittedSet, without: FittedSet, candidate: Candidate) -> CauseEvidence:
@@ -212,11 +212,10 @@ def _weighed(
 
     An alternative counts only as far as it does not predict still better beside the cause: effects that add up are no
     alternatives (Hoeting, Madigan, Raftery & Volinsky (1999), Statistical Science 14(4), eq. 1, over sets).
-    Alternatives that were ``rejected`` are left out, and so are those that explain nothing that matters; but what the
-    cause may imitate takes its share.
+    Alternatives that were ``rejected`` are left out, and so are those that explain nothing that matters.
     """
     candidate, without = position.candidate, position.without
-    left_out = {candidate.label, *(each.candidate.label for each in rejected if not _may_imitate(candidate, each))}
+    left_out = {candidate.label, *(each.candidate.label for each in rejected)}
     known = [each for each in position.alternatives if each.added and each.added.label not in left_out]
     in_its_place = zip(known, _shares([chosen], known)[1:], strict=True)
     strong = [each for each, share in in_its_place if share > THRESHOLDS.search.tried_beside]
@@ -228,7 +227,6 @@ def _weighed(
     effects = [each.added.effect for each in fitted if each.added]
     odds = [*[prior_odds(candidate.effect)] * len(sets), *(prior_odds(effect) for effect in effects), 1.0]
     share, alternatives = shares_by_effect(candidate.effect, effects, _shares(sets, [*fitted, without]), np.array(odds))
-    imitated, share, alternatives = without_rejected(share, alternatives, _rejected_effects(fitted, rejected))
     return Cause(
         candidate=candidate,
         share=share,
@@ -239,21 +237,32 @@ def _weighed(
         alternative_sets=position.alternatives,
         without=without,
         plausible=is_plausible(Comparison(base, without, replace(chosen, added=candidate))),
-        imitated=imitated,
+        imitated=_imitated(fitter, chosen, position, rejected),
     )
 
 
-def _rejected_effects(fitted: Sequence[FittedSet], rejected: Sequence[Cause]) -> frozenset[str]:
-    """Effects that were fitted in a cause's place only by candidates that were rejected."""
-    labels = {cause.candidate.label for cause in rejected}
-    by_label = {each.added.label: each.added.effect for each in fitted if each.added}
-    others = {effect for label, effect in by_label.items() if label not in labels}
-    return frozenset(effect for label, effect in by_label.items() if label in labels) - others
+def _imitated(
+    fitter: CandidateFitter, chosen: FittedSet, position: CauseAlternatives, rejected: Sequence[Cause]
+) -> float:
+    """Probability by what the commands predict that a cause only imitates an effect that was rejected for its equation.
+
+    Only a flexible effect can. What the rejected effect explains besides is no imitation.
+    """
+    labels = {each.candidate.label for each in rejected if is_supported_but_misspecified(each.evidence)}
+    if not is_flexible(position.candidate.effect):
+        return 0.0
+    found = [0.0]
+    for each in position.alternatives:
+        if each.added and each.added.label in labels and each.added.effect != position.candidate.effect:
+            both = fitter.add_candidate(chosen, each.added)
+            best = max((one for one in (chosen, both) if one), key=lambda one: one.evidence.total)
+            found.append(_probability_against(best.fit, each.fit))
+    return max(found)
 
 
-def _may_imitate(candidate: Candidate, rejected: Cause) -> bool:
-    """Whether a candidate is flexible, and may explain what is there in place of a cause whose equation is wrong."""
-    return is_flexible(candidate.effect) and is_supported_but_misspecified(rejected.evidence)
+def _probability_against(fit: CandidateFit, other: CandidateFit) -> float:
+    """Probability of another explanation against this one, by what the commands predict."""
+    return float(expit(-_lead(fit, other)))
 
 
 def _shares(sets: Sequence[FittedSet], others: Sequence[FittedSet]) -> Array:

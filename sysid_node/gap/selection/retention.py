@@ -9,7 +9,7 @@ and fits what the decisions ask for.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Protocol
@@ -130,19 +130,6 @@ def shares_by_effect(
         by_effect[effect] = by_effect.get(effect, 0.0) + float(share)
     others = sorted(((e, p) for e, p in by_effect.items() if e != cause), key=lambda pair: -pair[1])
     return by_effect[cause], tuple(others)
-
-
-def without_rejected(
-    share: float, alternatives: Sequence[tuple[str, float]], rejected: Collection[str]
-) -> tuple[float, float, tuple[tuple[str, float], ...]]:
-    """The share of the alternatives that were ``rejected`` (effects); the cause's share and the alternatives without.
-
-    The shares of what is left are relative to the rest.
-    """
-    gone = sum(p for effect, p in alternatives if effect in rejected)
-    rest = max(1.0 - gone, share)  # rounding may leave nothing of a share close to zero
-    kept = tuple((effect, p / rest) for effect, p in alternatives if effect not in rejected)
-    return 1.0 - rest, share / rest, kept
 
 
 def kept_causes(probabilities: Sequence[float]) -> list[tuple[int, ...]]:

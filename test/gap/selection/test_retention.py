@@ -22,7 +22,6 @@ from sysid_node.gap.selection.retention import (
     next_challenge,
     shares_by_effect,
     successor,
-    without_rejected,
 )
 from sysid_node.gap.thresholds import THRESHOLDS
 
@@ -182,21 +181,6 @@ def test_another_shape_of_the_same_effect_is_the_same_cause() -> None:
 def test_prior_odds_weigh_shares() -> None:
     share, ((_, other),) = shares_by_effect("a", ["b"], np.array([0.5, 0.5, 0.0]), np.array([1.0, 0.25, 1.0]))
     assert (share, other) == (pytest.approx(0.8), pytest.approx(0.2))
-
-
-def test_rejected_effects_keep_their_share_of_the_probability() -> None:
-    """Truth: 0.2 and 0.1 of what 0.6 leave, by hand."""
-    gone, share, alternatives = without_rejected(0.2, [("a", 0.6), ("b", 0.1)], {"a", "c"})
-    assert (gone, share) == (pytest.approx(0.6), pytest.approx(0.5))
-    assert alternatives == (("b", pytest.approx(0.25)),)
-    assert without_rejected(0.2, [("b", 0.1)], ()) == (0.0, 0.2, (("b", 0.1),))
-
-
-@given(st.floats(0.0, 1.0, exclude_min=True), st.floats(0.0, 1.0))
-def test_a_share_beside_rejected_effects_is_a_probability(share, other) -> None:
-    total = share + other
-    gone, left, _ = without_rejected(share / total, [("a", other / total)], {"a"})
-    assert 0.0 <= gone <= 1.0 and 0.0 < left <= 1.0 + 1e-12
 
 
 def test_what_is_least_probable_together_is_left_out_first() -> None:
