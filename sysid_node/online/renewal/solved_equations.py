@@ -14,6 +14,7 @@ from sysid_node.online.regression import (
     gust_correlation,
     least_squares,
     normal_equations,
+    overidentification,
     regressor_noise,
     weak_instruments,
 )
@@ -36,6 +37,7 @@ class SolvedEquations(NamedTuple):
     statistical: Uncertainty  # without the bias by gusts, which is the same in later flight
     spread: Uncertainty  # with that bias
     inflation: Array  # (C,) factors of the variances by gusts
+    scatter: Array  # (C,) factors of the variances by the scatter of the bands' estimates
     gusts: Array  # (C,) share of the residuals that is not the sensors' noise
     sensed: Array  # (C,) density of the sensors' noise in the residuals
     instruments: InstrumentChecks
@@ -52,14 +54,22 @@ def solved_equations(state: EstimatorState, total: Information, gram: Array) -> 
     sensed = _sensed(state, total, equations, solution)
     gusts = gust_correlation.share_of_gusts(spread.density, sensed)
     statistical = spread
-    if equations.least_squares and gusts.any():
-        unbiased = _covariance_in_gusts(state, total, gram, solution)
-        share = gust_correlation.share_by_axis(equations.structure.coefficients, gusts)[:, None, None]
-        spread = replace(spread, covariance=(1.0 - share) * spread.covariance + share * unbiased)
+    spread = _with_gust_bias(state, total, gram, solution, statistical, gusts)
     checks = _instrument_checks(state, total, gram, strength, solution, spread, noise_alone, gusts)
     answered = gust_correlation.of_solution(equations, solution, gram, gusts)
     inflation = gust_correlation.inflation(spread, gusts, answered)
-    return SolvedEquations(solution, compensation, noise, statistical, spread, inflation, gusts, sensed, checks)
+    scatter = np.where(equations.instrumented, _scatter(equations, solution, total, statistical), 1.0)
+    return SolvedEquations(
+        solution, compensation, noise, statistical, spread, inflation, scatter, gusts, sensed, checks
+    )
+
+
+def _scatter(equations: NormalEquations, solution: Solution, total: Information, spread: Uncertainty) -> Array:
+    """(C,) how many times the variances of the estimates are as large as one band's residuals say."""
+    if not solution.usable or total.trace_square <= 0.0:
+        return np.ones(equations.outputs.size)
+    found = overidentification.overidentification(equations, solution, total, spread)
+    return overidentification.variance_factors(equations, found, len(total.grams))
 
 
 def _solve(
@@ -104,6 +114,23 @@ def _instrument_checks(
     )
 
 
+def _with_gust_bias(
+    state: EstimatorState, total: Information, gram: Array, solution: Solution, spread: Uncertainty, gusts: Array
+) -> Uncertainty:
+    """With the bias by ``gusts`` (C,) of the equations that are solved by least squares though they have instruments.
+
+    These are all with ``sls_rft``, and with ``iv_rft`` those whose instruments are weak.
+    """
+    equations = state.equations
+    biased = state.model.instrumented.instrumented & ~equations.instrumented
+    share = np.where(biased, gust_correlation.share_by_axis(equations.structure.coefficients, gusts), 0.0)
+    if not share.any():
+        return spread
+    share = share[:, None, None]
+    unbiased = _covariance_in_gusts(state, total, gram, solution)
+    return replace(spread, covariance=(1.0 - share) * spread.covariance + share * unbiased)
+
+
 def _covariance_in_gusts(state: EstimatorState, total: Information, gram: Array, solution: Solution) -> Array:
     """(C, P, P) mean squared errors of least squares where all of the residual is of gusts.
 
@@ -113,10 +140,11 @@ def _covariance_in_gusts(state: EstimatorState, total: Information, gram: Array,
     """
     full = state.model.instrumented
     unbiased = least_squares.solve(full, gram)
-    known = least_squares.uncertainty(full, unbiased, total).covariance
+    known = least_squares.uncertainty(full, unbiased, total)
+    scatter = _scatter(full, unbiased, total, known)[:, None, None]
     factor = np.sqrt(least_squares.instrument_strength(full, unbiased, total).selection_factor)
     off = (solution.theta - unbiased.theta).T
-    return np.asarray(off[:, :, None] * off[:, None, :] + known * np.outer(factor, factor))
+    return np.asarray(off[:, :, None] * off[:, None, :] + scatter * known.covariance * np.outer(factor, factor))
 
 
 def _reconstruction_covariance(state: EstimatorState, solution: Solution, total: Information) -> Array:
