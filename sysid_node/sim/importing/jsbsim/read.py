@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from sysid_node.sim.importing.jsbsim.actuators import JsbsimServo
 from sysid_node.sim.importing.jsbsim.coefficients import CoefficientModel
 from sysid_node.sim.importing.jsbsim.files import ModelFiles
 from sysid_node.sim.importing.jsbsim.program import Program
-from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
+from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface, properties_read
 from sysid_node.sim.importing.jsbsim.survey import surveyed
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight
 
@@ -69,6 +70,7 @@ def read_model(model: str, airspeed: float | None = None, altitude: float | None
         aircraft = _aircraft(survey.files, program, survey.surfaces, survey.steady, model_, expansion, survey.servos)
         notes = [
             *_notes(program, survey.surfaces, survey.steady, model_, survey.servos),
+            *_unmoved(program, survey.surfaces, aerodynamics),
             *_remainder(model_, expansion, axes),
         ]
         imported = Imported(aircraft, tuple(notes))
@@ -190,6 +192,16 @@ def _notes(
         "The IMU's place is the model's eye point, the pilot's; flow angles are those at the centre of gravity."
     )
     return notes
+
+
+def _unmoved(program: Program, surfaces: Sequence[JsbsimSurface], aerodynamics: Sequence[Element]) -> list[str]:
+    """What of the flight control system the aerodynamics read besides the three controls and the throttle."""
+    moved = {name for surface in surfaces for name in surface.properties}
+    left = sorted(n for n in properties_read(aerodynamics) - moved if program.has(n) and "throttle" not in n)
+    if not left:
+        return []
+    return [f"The aerodynamics also read {', '.join(left)}, which neither elevator, aileron nor rudder moves; a file "
+            "of JSBSim has no such control, and they are held as they are without a command."]  # fmt: skip
 
 
 def _thrust_note(steady: SteadyFlight, model: CoefficientModel) -> str:
