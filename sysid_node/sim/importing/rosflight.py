@@ -135,8 +135,8 @@ def _notes(new: bool, lag: float, throttle: float | None, thrust: float, airspee
         notes.append("The file has no propeller and motor; the aircraft file has no throttle.")
     else:
         notes.append(
-            f"Thrust is {thrust:.1f} N at throttle {throttle:.3f} and {airspeed:.1f} m/s; how it changes with airspeed, "
-            "and how it differs from one in proportion to the throttle, is in the tables over V and throttle."
+            f"Thrust is {thrust:.1f} N at throttle {throttle:.3f} and {airspeed:.1f} m/s; how it changes with "
+            "airspeed, and how it differs from one in proportion to the throttle, is in the tables over V and throttle."
         )
     return notes
 
