@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Control, Geometry, Inertia
 from sysid_node.errors import InputError
-from sysid_node.sim.importing.imported import Imported
+from sysid_node.sim.importing.imported import Imported, asymmetry_notes
 from sysid_node.sim.importing.plant import LoadFunction, Plant, PlantEngine, PlantStates, aircraft_of
 
 Array = NDArray[np.float64]
@@ -83,7 +83,9 @@ def read_rosflight(path: Path, airspeed: float | None = None) -> Imported:
     aircraft, level = aircraft_of(plant, airspeed)
     thrust = level.throttle * (aircraft.throttle.max_thrust or 0.0) if aircraft.throttle is not None else 0.0
     notes = _notes(new, lag, level.throttle if powered else None, thrust, level.airspeed)
-    notes = [*_missing(parameters), *notes]
+    cross = max(abs(get.or_else(name, 0.0)) for name in ("Jxy", "Jyz"))
+    largest = max(get(name) for name in ("Jxx", "Jyy", "Jzz"))
+    notes = [*_missing(parameters), *notes, *asymmetry_notes(cross / largest)]
     if get.or_else("C_D_p", 0.0) <= 0.0:
         notes.append(
             "C_D_p is zero: rosflight_sim takes the parasitic drag from it (not from C_D_O), so there is none."

@@ -337,6 +337,13 @@ def test_of_a_vtol_the_motor_that_pulls_forward_is_the_engine(tmp_path):
     assert any(note.startswith("Of 3 motors only that of spin is held") for note in found.notes)
 
 
+def test_products_of_inertia_that_a_file_has_not_are_said(tmp_path):
+    path = small(tmp_path)
+    assert not any("Ixy" in note for note in read_gazebo(path).notes)
+    path.write_text(path.read_text().replace("<ixz>0.002</ixz>", "<ixz>0.002</ixz><iyz>0.01</iyz>"))
+    assert any(note.startswith("Ixy or Iyz is ") for note in read_gazebo(path).notes)
+
+
 def test_a_surface_whose_joint_is_not_there_is_one_line(tmp_path):
     path = small(tmp_path)
     path.write_text(path.read_text().replace("<control_joint_name>tail<", "<control_joint_name>elevator<"))

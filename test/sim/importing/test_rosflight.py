@@ -130,6 +130,13 @@ def test_missing_coefficients_are_said(tmp_path):
     assert not any("Missing" in note for note in read_rosflight(path).notes)
 
 
+def test_products_of_inertia_that_a_file_has_not_are_said(tmp_path):
+    path = tmp_path / "small.yaml"
+    path.write_text(yaml.safe_dump({"/**": {"ros__parameters": SMALL | {"Jxy": -0.019, "Jyz": 0.001}}}))
+    said = "Ixy or Iyz is 10.0% of the largest moment of inertia; a file has Ixz only."
+    assert said in read_rosflight(path).notes
+
+
 def test_half_a_propeller_is_one_line(tmp_path):
     path = tmp_path / "small.yaml"
     parameters = {name: value for name, value in SMALL.items() if name != "R_motor"}

@@ -19,7 +19,7 @@ from sysid_node.sim.importing.gazebo.lift_drag import LiftDrag
 from sysid_node.sim.importing.gazebo.motion import I_GAIN, leads, motor_effects, servo_effects
 from sysid_node.sim.importing.gazebo.numbers import number_in
 from sysid_node.sim.importing.gazebo.sdf import SdfModel, masses, read_sdf
-from sysid_node.sim.importing.imported import Imported
+from sysid_node.sim.importing.imported import Imported, asymmetry_notes
 from sysid_node.sim.importing.plant import Plant, PlantEngine, PlantStates, aircraft_of, nondimensional
 
 Array = NDArray[np.float64]
@@ -282,7 +282,13 @@ def _notes(model: SdfModel, loads: _Loads, simple: bool, advanced: bool) -> list
                      "has one throttle.")  # fmt: skip
     if any(model.includes):
         notes.append(f"Masses of included models ({', '.join(filter(None, model.includes))}) are not counted.")
-    return notes + _servo_notes(model, loads.joints)
+    inertia = masses(model)[2]
+    cross = max(abs(float(inertia[0, 1])), abs(float(inertia[1, 2])))
+    return [
+        *notes,
+        *asymmetry_notes(cross / (float(inertia.diagonal().max()) or 1.0)),
+        *_servo_notes(model, loads.joints),
+    ]
 
 
 def _servo_notes(model: SdfModel, joints: Sequence[str]) -> list[str]:

@@ -22,7 +22,7 @@ from sysid_node.aircraft.model import (
 )
 from sysid_node.aircraft.names import CONTROL_SYMBOLS
 from sysid_node.sim.importing.expansion import Expansion, TableAxis, expand, largest_error
-from sysid_node.sim.importing.imported import Imported
+from sysid_node.sim.importing.imported import Imported, asymmetry_notes
 from sysid_node.sim.importing.jsbsim.actuators import JsbsimServo
 from sysid_node.sim.importing.jsbsim.coefficients import CoefficientModel
 from sysid_node.sim.importing.jsbsim.files import ModelFiles
@@ -173,10 +173,7 @@ def _notes(
             notes.append(f"The {surface.name} moves from {low:.3f} to {high:.3f} rad; a file has one limit both ways.")
         if not surface.position.endswith(("-rad", "-deg")):
             notes.append(f"The {surface.name}'s joint is {surface.position}, without unit, for there is none in rad.")
-    if program.cross_products > 1e-3:
-        notes.append(
-            f"Ixy or Iyz is {program.cross_products:.1%} of the largest moment of inertia; a file has Ixz only."
-        )
+    notes += asymmetry_notes(program.cross_products)
     left = [
         n for n, v in zip(("CD", "CY", "Cl", "Cn"), model.unsteady.slopes[[1, 2, 3, 5]], strict=True) if abs(v) > 0.01
     ]
