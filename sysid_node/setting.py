@@ -27,7 +27,10 @@ def parse_setting(key: str, kind: Any, value: Any) -> Any:
             return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
         if kind is bool and isinstance(value, str):
             return BOOLEANS[value.lower()]
-        return kind(value)
+        plain = kind(value)
+        if not isinstance(value, str) and (plain != value or isinstance(value, bool) != (kind is bool)):
+            raise ValueError  # what int() cuts off, or a truth value that stands where a number is expected
+        return plain
     except (KeyError, TypeError, ValueError):
         wanted = "START:STEP:STOP in Hz" if numbers else f"a {kind.__name__}"
         raise InputError(f"setting {key} = {value!r}: expected {wanted}") from None

@@ -12,7 +12,7 @@ import pytest
 from short_bags import short_bag
 
 import sysid_node
-from sysid_node import identify, load, replay
+from sysid_node import diagnose, identify, load, replay
 from sysid_node.cli.main import main
 from sysid_node.errors import InputError
 from sysid_node.flight.csv import write_csv
@@ -149,6 +149,19 @@ def test_a_table_for_pandas(replayed, flight):
         (lambda: replay(load(BAG, "cdrw"), {"windoww": 3}), "'windoww' is not known"),
         (lambda: identify([], "equation_error"), "no flight to identify from"),
         (lambda: identify(load("nowhere.csv", "cdrw"), "equation_error"), "nowhere.csv"),
+        (lambda: load(BAG, "cdrw", body_frame="FRD"), "body_frame = 'FRD': expected one of flu, frd"),
+        (lambda: load([BAG], "cdrw"), "expected the path of one bag or log"),
+        (lambda: replay(str(BAG)), "expected what load(path, aircraft) returns"),
+        (lambda: identify([load(BAG, "cdrw"), BAG], "equation_error"), "flights: got"),
+        (lambda: identify(load(BAG, "cdrw"), "equation_error", holdout=str(BAG)), "holdout: got"),
+        (lambda: identify(load(BAG, "cdrw"), None), "method None: expected one of equation_error"),
+        (lambda: diagnose(load(BAG, "cdrw"), simulated=str(BAG)), "simulated: got"),
+        (lambda: identify(load(BAG, "cdrw"), "equation_error", {"stepwise": None}), "expected a bool"),
+        (lambda: replay(load(BAG, "cdrw"), {"window": True}), "setting window = True: expected a float"),
+        (
+            lambda: identify([load(BAG, "cdrw"), load(BAG, "kestrel")], "equation_error"),
+            "were loaded with different aircraft files (cdrw and kestrel)",
+        ),
     ],
 )
 def test_mistakes_are_one_line(work, said):

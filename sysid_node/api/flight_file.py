@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.api.data_frames import data_frame
+from sysid_node.errors import InputError
 from sysid_node.flight.align import MAX_GAP
-from sysid_node.flight.frames import BodyFrame
+from sysid_node.flight.frames import BODY_FRAMES, BodyFrame
 from sysid_node.flight.logs.opening import load_flight_record
 from sysid_node.flight.record import FlightRecord
 from sysid_node.flight.topics import topic_names
@@ -83,10 +84,34 @@ def load(
     ``aircraft``: an aircraft file, the name of one that is shipped, or an ``Aircraft``. ``topics``: names in the bag,
     as ``"imu/data:=/mavros/imu/data"``. ``body_frame``: axes of the IMU messages, ``"flu"`` (REP-103) or ``"frd"``.
 
-    Raises InputError where the aircraft file or a topic's name is wrong.
+    Raises InputError where the aircraft file, a topic's name or ``body_frame`` is wrong.
     """
+    if not isinstance(path, str | Path):
+        raise InputError(f"path {path!r:.80}: expected the path of one bag or log; load each flight by itself")
+    if body_frame not in BODY_FRAMES:
+        raise InputError(f"body_frame = {body_frame!r}: expected one of {', '.join(BODY_FRAMES)}")
     known = aircraft if isinstance(aircraft, Aircraft) else load_aircraft(aircraft)
     return FlightFile(Path(path), known, topic_names(topics), body_frame)
+
+
+def flight_list(given: FlightFile | Iterable[FlightFile], called: str) -> list[FlightFile]:
+    """One flight or several as a list; ``called`` is the argument's name. Raises InputError for what is no flight."""
+    flights = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+    for flight in flights:
+        if not isinstance(flight, FlightFile):
+            raise InputError(f"{called}: got {flight!r:.80}, expected what load(path, aircraft) returns")
+    return flights
+
+
+def refuse_other_aircraft(flights: Sequence[FlightFile]) -> None:
+    """Raise InputError where two flights were loaded with different aircraft files, of which one alone would count."""
+    first = flights[0]
+    for flight in flights[1:]:
+        if flight.aircraft != first.aircraft:
+            raise InputError(
+                f"flights {first.name} and {flight.name} were loaded with different aircraft files "
+                f"({first.aircraft.name} and {flight.aircraft.name}); load all with one"
+            )
 
 
 def read_alike(

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from sysid_node.aircraft.model import Derivative
 from sysid_node.api.compiled_programs import release_compiled_programs
 from sysid_node.api.data_frames import data_frame
-from sysid_node.api.flight_file import FlightFile, read_alike
+from sysid_node.api.flight_file import FlightFile, flight_list, read_alike, refuse_other_aircraft
 from sysid_node.errors import InputError, noted_warnings
 from sysid_node.flight.commanded import CARRIED
 from sysid_node.gap.correction import corrected_aircraft
@@ -110,9 +110,9 @@ class GapDiagnosis:
 def diagnose(
     flights: FlightFile | Sequence[FlightFile],
     *,
-    holdout: Sequence[FlightFile] = (),
+    holdout: FlightFile | Sequence[FlightFile] = (),
     simulator: str | None = None,
-    simulated: Sequence[FlightFile] = (),
+    simulated: FlightFile | Sequence[FlightFile] = (),
     actuators: str = "auto",
     resume: str | Path | None = None,
     progress: Callable[[float, str], None] | None = None,
@@ -131,10 +131,14 @@ def diagnose(
     is fitted and held out at once, or shows no motion; where the simulator's model cannot be read or is another
     aircraft's; and where the simulated flights do not suffice.
     """
-    flights = [flights] if isinstance(flights, FlightFile) else list(flights)
+    flights, held, of_simulation = (
+        flight_list(given, called)
+        for given, called in ((flights, "flights"), (holdout, "holdout"), (simulated, "simulated"))
+    )
     if not flights:
         raise InputError("no flight to diagnose; give at least one")
-    if simulator is not None and simulated:
+    refuse_other_aircraft([*flights, *held, *of_simulation])
+    if simulator is not None and of_simulation:
         raise InputError("simulator and simulated: both are given; give the model, or flights recorded in it")
     if actuators not in CARRIED:
         raise InputError(f"actuators = {actuators!r}: expected one of {', '.join(CARRIED)}")
@@ -149,7 +153,7 @@ def diagnose(
                 lambda f, carried: load_gap_flight(f.path, aircraft, f.topics, f.body_frame, carried),
                 lambda flight: flight.record.commanded,
             )
-            for group in ([*flights, *holdout], list(simulated))
+            for group in ([*flights, *held], of_simulation)
         )
     fitted, held_out = real[: len(flights)], real[len(flights) :]
     keep = None if resume is None else Path(resume)

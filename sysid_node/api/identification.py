@@ -10,8 +10,8 @@ from pathlib import Path
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.api.compiled_programs import release_compiled_programs
 from sysid_node.api.estimated_run import EstimatedRun
-from sysid_node.api.flight_file import FlightFile, read_alike
-from sysid_node.batch.identify import Identification, refuse_unused
+from sysid_node.api.flight_file import FlightFile, flight_list, read_alike, refuse_other_aircraft
+from sysid_node.batch.identify import METHODS, Identification, refuse_unused
 from sysid_node.batch.identify import identify as identify_records
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError, InputWarning, noted_warnings
@@ -53,7 +53,7 @@ def identify(
     method: str,
     settings: Mapping[str, object] | None = None,
     *,
-    holdout: Sequence[FlightFile] = (),
+    holdout: FlightFile | Sequence[FlightFile] = (),
     progress: Callable[[float, str], None] | None = None,
 ) -> BatchIdentification:
     """Estimates an aircraft's derivatives from whole flights, and checks them on flights that are held out.
@@ -64,9 +64,12 @@ def identify(
 
     Raises InputError where a setting, the method or a flight is not as it must be.
     """
-    flights = [flights] if isinstance(flights, FlightFile) else list(flights)
+    flights, held = flight_list(flights, "flights"), flight_list(holdout, "holdout")
     if not flights:
         raise InputError("no flight to identify from; give at least one")
+    refuse_other_aircraft([*flights, *held])
+    if method not in METHODS:
+        raise InputError(f"method {method!r}: expected one of {', '.join(METHODS)}")
     chosen = BatchSettings.from_mapping(settings or {})
     refuse_unused(method, settings or {})
     tell = progress or (lambda share, doing: None)
@@ -74,7 +77,7 @@ def identify(
     noted: list[str] = []
     with noted_warnings(noted):
         every = read_alike(
-            [*flights, *holdout],
+            [*flights, *held],
             chosen.actuators,
             lambda flight, carried: flight.aligned(chosen.max_gap, carried),
             lambda record: record.commanded,

@@ -15,7 +15,7 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.stated_effects import as_estimated, not_taken_in_words
 from sysid_node.api.estimated_run import EstimatedRun
-from sysid_node.api.flight_file import FlightFile
+from sysid_node.api.flight_file import FlightFile, flight_list
 from sysid_node.errors import InputError, InputWarning, noted_warnings
 from sysid_node.faults.model.reference_model import identifier_estimates
 from sysid_node.faults.recorded_flight import FaultVerdict, RecordedEstimates, RecordedMonitor
@@ -150,6 +150,7 @@ def replay(
     Raises InputError where a setting is wrong, the bag cannot be read, lacks a joint of the aircraft, or gives no
     sample.
     """
+    (flight,) = flight_list(flight, "flight")
     chosen, publish_rate = replay_settings(settings or {})
     truth = truth_at_end(flight.path)
     tell: Progress = progress or (lambda share, doing: None)

@@ -47,7 +47,7 @@ def motion(aircraft, x):
 
 def trimmed(aircraft, level):
     """The level flight as columns of length one: what ``level`` gives, the rest zero."""
-    names = ("alpha", "beta", "p", "q", "r", "V", *aircraft.control_symbols)
+    names = ("alpha", "beta", "p", "q", "r", "V", "throttle", *aircraft.control_symbols)
     return {name: np.array([float(level.get(name, 0.0))]) for name in names}
 
 

@@ -16,7 +16,7 @@ def level_flight(aircraft):
         x = {
             n: np.array([float(level.get(n, 0.0))])
             for n in ("alpha", "beta", "p", "q", "r", "V", *aircraft.control_symbols)
-        }
+        } | {"throttle": z[2:3]}
         load = loads(aircraft, x, z[2] * throttle.max_thrust)[0]
         phi = z[5]
         down = np.array([-np.sin(z[0]), np.sin(phi) * np.cos(z[0]), np.cos(phi) * np.cos(z[0])])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import warnings
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +22,7 @@ from sysid_node.cli.live.loop_table import loop_table
 from sysid_node.cli.live.processes import node_process
 from sysid_node.cli.live.ros_domain import own_domain
 from sysid_node.cli.shared import options
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.online.settings import METHODS
 from sysid_node.report.files.loop_folder import write_loop_folder
 from sysid_node.report.files.outputs.output_folder import output_folder
@@ -70,6 +71,9 @@ def run(args: argparse.Namespace) -> None:
         args.surfaces,
     )
     scenario.check_simulation()
+    if args.fail and args.seconds <= ONSET:
+        text = f"--seconds {args.seconds:g}: the failure begins at {ONSET:g} s, after the flight"
+        warnings.warn(f"{text}; fly longer, or give --fail ''", InputWarning, stacklevel=2)
     inputs, logs = options.inputs_of([], args.aircraft), [f"{node}.log" for node in NODES]
     with output_folder(args.out, "loop", inputs=inputs, force=args.force, working=logs) as out:
         flight = _fly(scenario)

@@ -100,7 +100,8 @@ def _show_findings(console: Console, findings: Sequence[Finding]) -> None:
     count = f"{len(unusual)} of {len(findings)} values look unusual" if unusual else ""
     console.print(f"\n{count or f'none of {len(findings)} checked values looks unusual'}", style="bold")
     for finding in unusual:
-        text = f"  {finding.name} = {number(finding.value)} {finding.unit} (usual: {finding.usual}): {finding.meaning}"
+        value = f"{number(finding.value)} {'' if finding.unit == '1' else finding.unit}".rstrip()
+        text = f"  {finding.name} = {value} (usual: {finding.usual}): {finding.meaning}"
         console.print(f"{text} [{finding.source}]", style="yellow", markup=False)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -66,6 +67,8 @@ def run(args: argparse.Namespace) -> None:
     aircraft = load_aircraft(args.aircraft or (_kept_beside(args.estimate, summary) if summary else args.estimate))
     left: list[str] = []
     if summary:
+        if args.aircraft:
+            _refuse_another(args.estimate, summary, args.aircraft, aircraft)
         aircraft, left = with_estimates(aircraft, summary["derivatives"])
     exported = _into(args, aircraft) if args.own_model is not None else _write(args.format, aircraft, args.effect)
     write_file(args.out, exported.text)
@@ -82,16 +85,40 @@ def _kept_beside(estimate: str, summary: Mapping[str, Any]) -> Path:
 
     A name alone is not enough: another aircraft of that name may come with the package.
     """
+    kept = _kept(estimate, summary)
+    if kept is not None:
+        return kept
+    raise InputError(
+        f"{Path(estimate)}: keeps no aircraft file, and {summary['aircraft']!r:.60} may name several; "
+        "give the one that was used as --aircraft"
+    )
+
+
+def _kept(estimate: str, summary: Mapping[str, Any]) -> Path | None:
+    """The aircraft file that a run keeps beside its summary; None where there is none."""
     path = Path(estimate)
     kept = (path if path.is_dir() else path.parent) / AIRCRAFT
     written = summary.get(WRITTEN)
     files = written.get("files") if isinstance(written, dict) else None
-    if isinstance(files, list) and AIRCRAFT in files and kept.is_file():
-        return kept
-    raise InputError(
-        f"{path}: keeps no aircraft file, and {summary['aircraft']!r:.60} may name several; "
-        "give the one that was used as --aircraft"
-    )
+    return kept if isinstance(files, list) and AIRCRAFT in files and kept.is_file() else None
+
+
+def _refuse_another(estimate: str, summary: Mapping[str, Any], given: str, aircraft: Aircraft) -> None:
+    """Raise InputError where the aircraft is not that of the estimate: coefficients belong to an area and a chord."""
+    if summary["aircraft"] != aircraft.name:
+        raise InputError(
+            f"--aircraft {given}: is {aircraft.name!r:.60}, but {estimate} was estimated with "
+            f"{summary['aircraft']!r:.60}; give that aircraft's file"
+        )
+    kept = _kept(estimate, summary)
+    used = aircraft.geometry if kept is None else load_aircraft(kept).geometry
+    for name in ("S", "b", "cbar"):
+        ours, theirs = getattr(aircraft.geometry, name), getattr(used, name)
+        if not math.isclose(ours, theirs, rel_tol=1e-6):
+            raise InputError(
+                f"--aircraft {given}: geometry.{name} is {ours:g}, but {estimate} was estimated with {theirs:g}, to "
+                "which its coefficients belong; give the file that was used"
+            )
 
 
 def with_estimates(aircraft: Aircraft, estimates: Mapping[str, Mapping[str, Any]]) -> tuple[Aircraft, list[str]]:

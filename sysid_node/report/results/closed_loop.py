@@ -37,6 +37,11 @@ class ClosedLoopFlight:
     events: Sequence[Event]
     troubles: Mapping[str, int]  # by topic: how often its messages were reported late, lost or missing
 
+    @property
+    def failed(self) -> bool:
+        """Whether the failure began within the flight."""
+        return bool(self.failure) and bool(self.time) and self.time[-1] >= self.onset
+
     def rms(self, axis: str, start: float, stop: float) -> float:
         """Root mean square of a tracking error between two times, rad; NaN without data."""
         time, errors = np.asarray(self.time), np.asarray(self.errors[axis])
@@ -49,11 +54,12 @@ class ClosedLoopFlight:
         if not self.failure or end < self.onset:
             return [("whole flight", 0.0, end)]
         middle = self.onset + settled
-        return [
+        parts = [
             ("before the failure", 0.5 * self.onset, self.onset),
             (f"the first {settled:g} s after it", self.onset, min(middle, end)),
             ("from then on", middle, end),
         ]
+        return [(name, start, stop) for name, start, stop in parts if start < stop]
 
     def summary(self) -> dict[str, Any]:
         """The content of ``summary.json``: errors in rad, null without data."""

@@ -32,6 +32,9 @@ Array = NDArray[np.float64]
 #: Smallest part of a coefficient that becomes a derivative or a table.
 _TOLERANCE = np.full(6, 1e-7)
 
+#: Throttles of the tables; close together near zero, where a rotor's speed grows as the root of its thrust.
+_THROTTLES = (0.0, 0.0025, 0.01, 0.0225, *np.linspace(0.05, 1.0, 20))
+
 #: Lift coefficients of the airspeeds that are tried where none is given.
 _LIFTS = (0.4, 0.25, 0.6, 0.9, 0.15)
 
@@ -105,12 +108,13 @@ def aircraft_of(plant: Plant, airspeed: float | None) -> tuple[Aircraft, LevelFl
     steady = np.array([thrust[0], 0.0, thrust[2], 0.0, thrust[4], 0.0]) if throttle else np.zeros(6)
 
     def coefficients(points: Mapping[str, Array]) -> Array:
-        """All loads but the steady thrust."""
+        """All loads but a thrust in proportion to the throttle."""
         states = _states_of(plant, points, level.throttle)
-        load = plant.air(states) + _engine(plant, states) - steady
+        share = states.throttle / (level.throttle or 1.0)
+        load = plant.air(states) + _engine(plant, states) - np.outer(share, steady)
         return nondimensional(load, plant.density, states, plant.geometry)
 
-    expansion = expand(coefficients, _axes(plant, level), _TOLERANCE)
+    expansion = expand(coefficients, _axes(plant, level, powered=throttle is not None), _TOLERANCE)
     aircraft = Aircraft(
         name=plant.name,
         source=f"{plant.source}; about level flight at {level.airspeed:.2f} m/s, alpha {level.alpha:.4f} rad",
@@ -155,16 +159,19 @@ def _states_of(plant: Plant, points: Mapping[str, Array], throttle: float) -> Pl
     p, r = (points[name] * 2.0 * speed / plant.geometry.b for name in "pr")
     q = points["q"] * 2.0 * speed / plant.geometry.cbar
     controls = {control.symbol: points[control.symbol] for control in plant.controls.values()}
-    return PlantStates(speed, points["alpha"], points["beta"], p, q, r, controls, np.full_like(speed, throttle))
+    lever = points.get("throttle", np.full_like(speed, throttle))
+    return PlantStates(speed, points["alpha"], points["beta"], p, q, r, controls, lever)
 
 
-def _axes(plant: Plant, level: LevelFlight) -> dict[str, TableAxis]:
+def _axes(plant: Plant, level: LevelFlight, *, powered: bool) -> dict[str, TableAxis]:
     alpha, beta = plant.nodes["alpha"], plant.nodes["beta"]
     axes = {"alpha": TableAxis.of(alpha, level.alpha, 1e-3), "beta": TableAxis.of(beta, 0.0, 1e-3)}
     for name, size in (("p", 0.15), ("q", 0.03), ("r", 0.15)):
         axes[name] = TableAxis.of(size * np.linspace(-1.0, 1.0, 5), 0.0, 0.01 * size)
     speeds = level.airspeed * np.array([0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15, 1.2, 1.35, 1.5])
     axes["V"] = TableAxis.of(speeds, level.airspeed, 0.01)
+    if powered:
+        axes["throttle"] = TableAxis.of(np.array(_THROTTLES), level.throttle, 0.01)
     for control in plant.controls.values():
         limit = control.limit or 0.5
         nodes = plant.nodes.get(control.symbol, limit * np.linspace(-1.0, 1.0, 5))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Control, Geometry, Inertia
 from sysid_node.errors import InputError
-from sysid_node.sim.importing.imported import Imported
+from sysid_node.sim.importing.imported import Imported, asymmetry_notes
 from sysid_node.sim.importing.plant import LoadFunction, Plant, PlantEngine, PlantStates, aircraft_of
 
 Array = NDArray[np.float64]
@@ -39,6 +39,14 @@ _ANGLE = "max_{}_deflection_angle"
 _ALPHA = np.deg2rad(np.arange(-20.0, 30.01, 0.5))
 _BETA = np.array([-0.3, 0.0, 0.3])
 
+#: The coefficients that rosflight_sim's equations read. One that is missing is zero there, after an error in its log.
+_LONGITUDINAL = {"L": ("O", "alpha", "q", "delta_e"), "D": ("p", "q", "delta_e"), "m": ("O", "alpha", "q", "delta_e")}
+_LATERAL = dict.fromkeys(("Y", "ell", "n"), ("O", "beta", "p", "r", "delta_a", "delta_r"))
+_COEFFICIENTS = tuple(f"C_{c}_{r}" for c, named in (_LONGITUDINAL | _LATERAL).items() for r in named)
+
+#: How many missing coefficients are named.
+_NAMED = 6
+
 _PROPELLER = ("D_prop", "CT_0", "CT_1", "CT_2", "CQ_0", "CQ_1", "CQ_2", "KQ", "V_max", "R_motor", "I_0")
 
 #: Where ROSflight's own files have masses and inertias besides parameters: comments such as ``# Jx: 0.25``.
@@ -54,7 +62,7 @@ def read_rosflight(path: Path, airspeed: float | None = None) -> Imported:
         name: Control(name, symbol, {name: sign}, limit=min(angles[name], math.pi / 2))
         for name, (symbol, _, sign) in _CONTROLS.items()
     }
-    powered = all(name in parameters for name in _PROPELLER)
+    powered = any(name in parameters for name in _PROPELLER)
     model = _Model(get, blend=not new, powered=powered)
     lag = get.or_else("servo_tau", 0.0)
     lag = lag if lag > NO_SERVO_LAG else 0.0
@@ -73,7 +81,11 @@ def read_rosflight(path: Path, airspeed: float | None = None) -> Imported:
         effects=effects,
     )
     aircraft, level = aircraft_of(plant, airspeed)
-    notes = _notes(new, lag, level.throttle if powered else None, level.airspeed)
+    thrust = level.throttle * (aircraft.throttle.max_thrust or 0.0) if aircraft.throttle is not None else 0.0
+    notes = _notes(new, lag, level.throttle if powered else None, thrust, level.airspeed)
+    cross = max(abs(get.or_else(name, 0.0)) for name in ("Jxy", "Jyz"))
+    largest = max(get(name) for name in ("Jxx", "Jyy", "Jzz"))
+    notes = [*_missing(parameters), *notes, *asymmetry_notes(cross / largest)]
     if get.or_else("C_D_p", 0.0) <= 0.0:
         notes.append(
             "C_D_p is zero: rosflight_sim takes the parasitic drag from it (not from C_D_O), so there is none."
@@ -97,7 +109,18 @@ def _in_radians(parameters: Mapping[str, Any]) -> bool:
     return any(_ANGLE.format(name) in parameters for name in _CONTROLS)
 
 
-def _notes(new: bool, lag: float, throttle: float | None, airspeed: float) -> list[str]:
+def _missing(parameters: Mapping[str, Any]) -> list[str]:
+    """A line that names the coefficients that the file does not have: one may be misspelt, or the file cut off."""
+    missing = [name for name in _COEFFICIENTS if name not in parameters]
+    if not missing:
+        return []
+    more = f" and {len(missing) - _NAMED} more" if len(missing) > _NAMED else ""
+    return [
+        f"Missing coefficients are taken as zero, as rosflight_sim takes them: {', '.join(missing[:_NAMED])}{more}."
+    ]
+
+
+def _notes(new: bool, lag: float, throttle: float | None, thrust: float, airspeed: float) -> list[str]:
     notes = [
         "Deflections are in rad, and the lift is linear: the file states a largest deflection, as versions of "
         "rosflight_sim do that do not blend at stall."
@@ -114,8 +137,8 @@ def _notes(new: bool, lag: float, throttle: float | None, airspeed: float) -> li
         notes.append("The file has no propeller and motor; the aircraft file has no throttle.")
     else:
         notes.append(
-            f"Thrust is exact at throttle {throttle:.3f} for all airspeeds (tables over V) and proportional to the "
-            f"throttle at {airspeed:.1f} m/s; the rotor's curve over the throttle is not held."
+            f"Thrust is {thrust:.1f} N at throttle {throttle:.3f} and {airspeed:.1f} m/s; how it changes with "
+            "airspeed, and how it differs from one in proportion to the throttle, is in the tables over V and throttle."
         )
     return notes
 
@@ -163,10 +186,7 @@ class _Model:
         self.geometry = Geometry(get.positive("wing_s"), get.positive("wing_b"), get.positive("wing_c"))
         self.density = get.positive("rho")
         self._blend, self._M, self._alpha0 = blend, get("wing_M"), get("wing_alpha0")
-        regressors = ("O", "alpha", "beta", "p", "q", "r", "delta_a", "delta_e", "delta_r")
-        self._c = {
-            f"{c}_{r}": get.or_else(f"C_{c}_{r}", 0.0) for c in ("L", "D", "ell", "m", "n", "Y") for r in regressors
-        }
+        self._c = {name.removeprefix("C_"): get.or_else(name, 0.0) for name in _COEFFICIENTS}
         self._prop = {name: get(name) for name in _PROPELLER} if powered else {}
 
     def air(self, s: PlantStates) -> Array:

@@ -74,13 +74,13 @@ def _lanes(flight: ClosedLoopFlight) -> list[Lane]:
         change for begin, end in flight.excited for change in (LaneChange(begin, "excites"), LaneChange(end, NOTHING))
     ]
     lanes = [Lane("exciter", [LaneChange(0.0, NOTHING), *excited])]
-    if flight.failure:
+    if flight.failed:
         lanes.append(Lane("failure", [LaneChange(0.0, NOTHING), LaneChange(flight.onset, flight.failure)], VERMILION))
     return lanes
 
 
 def _about(flight: ClosedLoopFlight) -> str:
     gains = "gains that follow the identified model" if flight.adapted else "the fixed gains of the aircraft file"
-    failure = f"At {flight.onset:.0f} s this failure begins: `{flight.failure}`." if flight.failure else ""
+    failure = f"At {flight.onset:.0f} s this failure begins: `{flight.failure}`." if flight.failed else ""
     attitude = "The aircraft stands at one place and shows roll and pitch: the folder holds no airspeed."
     return f"# {flight.aircraft} in closed loop\n\nFlown with {gains}. {failure}\n\n{attitude}"

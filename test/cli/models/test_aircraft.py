@@ -78,6 +78,13 @@ def test_a_wrong_sign_is_named_with_its_range(tmp_path, capsys):
     assert "Cm_alpha = 0.235 1/rad (usual: -4 to 0): positive: unstable in pitch" in " ".join(said.split())
 
 
+def test_a_number_without_unit_stands_alone(tmp_path, capsys):
+    text = CDRW.read_text().replace("Ixx: 0.1903", "Ixx: 0.6")
+    (tmp_path / "wrong.yaml").write_text(text)
+    assert sysid(tmp_path / "wrong.yaml", "--no-budget") == 0
+    assert "Ixx over m b^2 = 0.0667 (usual: 0.003 to 0.06)" in " ".join(capsys.readouterr().out.split())
+
+
 def test_a_mass_in_grams_is_said_although_there_is_no_level_flight(tmp_path, capsys):
     text = CDRW.read_text().replace("mass: 4.0 ", "mass: 4000.0 ")
     (tmp_path / "grams.yaml").write_text(text)

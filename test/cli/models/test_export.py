@@ -115,6 +115,8 @@ def test_a_corrected_file_is_exported_with_its_effects(tmp_path, capsys, form):
     [
         (["nobody", "--format", "jsbsim"], "nobody"),
         (["kestrel", "--format", "jsbsim", "--aircraft", "cdrw"], "kestrel is an aircraft itself; give one of the two"),
+        (["{run}", "--format", "jsbsim", "--aircraft", "cdfp"], "is 'cdfp', but {run} was estimated with 'cdrw'"),
+        (["{run}", "--format", "jsbsim", "--aircraft", "{run}/other.yaml"], "geometry.S is 0.9, but {run} was"),
         (["missing/summary.json", "--format", "jsbsim"], "not found"),
         (
             ["{run}/summary.json", "--format", "gazebo", "--effect", "actuator_backlash:elevator=0.02"],
@@ -132,12 +134,14 @@ def test_a_corrected_file_is_exported_with_its_effects(tmp_path, capsys, form):
 def test_bad_input_is_one_line(run, capsys, arguments, said):
     (run / "broken.json").write_text("{")
     (run / "own.yaml").write_text("name: mine")
+    cdrw = load_aircraft("cdrw")
+    (run / "other.yaml").write_text(dump_aircraft(replace(cdrw, geometry=replace(cdrw.geometry, S=0.9))))
     words = [word.replace("{run}", str(run)) for word in arguments]
     if "--out" not in words:
         words += ["--out", str(run / "model")]
     assert main(["export", *words]) == 2
     message = capsys.readouterr().err
-    assert said in message
+    assert said.replace("{run}", str(run)) in message
     assert message.count("\n") == 1
 
 

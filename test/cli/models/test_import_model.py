@@ -31,7 +31,7 @@ def test_the_file_loads_and_says_what_it_does_not_hold(model, tmp_path, capsys):
     assert "- The file has no propeller and motor" in said.out
     assert "no rigid body has Ixx" in said.err  # a warning: a simulator flies with it
     assert out.read_text().startswith(
-        "# Written by sysid import --format rosflight from x8; rm -rf.yaml.\n# - Deflections"
+        "# Written by sysid import --format rosflight from x8; rm -rf.yaml.\n# - Missing coefficients"
     )
     with pytest.warns(UserWarning, match="no rigid body"):
         aircraft = load_aircraft(out)

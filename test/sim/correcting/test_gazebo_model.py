@@ -143,7 +143,9 @@ def test_a_servo_without_a_controller_is_a_line(model, tmp_path):
     ("was", "is_now", "said"),
     [
         ("AdvancedLiftDrag", "LiftDrag", "it needs one plugin AdvancedLiftDrag and no LiftDrag"),
-        ("<name>elevator</name>", "<name>stabilator</name>", "has other controls; it must be read from this file"),
+        ('elevator"', 'stabilator"', "names the joint 'elevator', which the model has not"),
+        ("elevator<", "stabilator<", "names the joint 'stabilator', which the model has not"),
+        ("elevator", "stabilator", "has other controls; it must be read from this file"),
     ],
 )
 def test_another_model_is_one_line(model, tmp_path, was, is_now, said):

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from aircraft_loads import loads, motion, planes, scales
+from aircraft_loads import loads, motion, planes, scales, trimmed
 from level_flight import level_flight
 
 from sysid_node.errors import InputError
@@ -187,7 +187,7 @@ def pose_of(model, element):
     return numbers + pose_of(model, other)
 
 
-def theirs(path, x, aircraft, throttle):
+def theirs(path, x, aircraft):
     """Loads (N, 6) about the centre of gravity, forward-right-down, summed over all plugins."""
     model = ElementTree.parse(path).getroot().find(".//model")
     bodies = {}
@@ -223,7 +223,7 @@ def theirs(path, x, aircraft, throttle):
                 pose, place, _ = bodies[plugin.findtext("linkName")]
                 plugin.set("pitch", str(pose[4]))
                 arm = place - centre
-                force, torque = rotor(plugin, v + np.cross(w, arm), throttle)
+                force, torque = rotor(plugin, v + np.cross(w, arm), x["throttle"][i])
             else:
                 continue
             total += np.concatenate([force, torque + np.cross(arm, force)])
@@ -239,9 +239,7 @@ def test_loads_are_those_of_the_plugins_at_the_tables_points(tmp_path, name):
     aircraft = read_gazebo(path).aircraft
     level = level_flight(aircraft)
     x = planes(aircraft, level, 5)
-    error = loads(aircraft, x, level["throttle"] * aircraft.throttle.max_thrust) - theirs(
-        path, x, aircraft, level["throttle"]
-    )
+    error = loads(aircraft, x, x["throttle"] * aircraft.throttle.max_thrust) - theirs(path, x, aircraft)
     assert np.abs(error / scales(aircraft, x)).max() < 1e-6
 
 
@@ -319,6 +317,49 @@ def test_what_is_no_model_is_one_line(tmp_path, text, said):
     path.write_text(text)
     with pytest.raises(InputError, match=said):
         read_gazebo(path)
+
+
+LIFTER = (
+    '<link name="up{0}"><pose>{1} 0.2 0 0 0 0</pose><inertial><mass>0.01</mass></inertial></link>'
+    "<plugin filename='x' name='gz::sim::systems::MulticopterMotorModel'><jointName>lift{0}</jointName>"
+    "<linkName>up{0}</linkName></plugin>"
+)
+
+
+def test_of_a_vtol_the_motor_that_pulls_forward_is_the_engine(tmp_path):
+    path = small(tmp_path)
+    alone = read_gazebo(path).aircraft.throttle
+    head, motor, tail = path.read_text().partition('<plugin filename="x" name="gz::sim::systems::Multicopter')
+    path.write_text(head + LIFTER.format(0, 0.2) + LIFTER.format(1, -0.2) + motor + tail)
+    found = read_gazebo(path)
+    assert found.aircraft.throttle.joint == "spin"
+    assert found.aircraft.throttle.max_thrust == pytest.approx(alone.max_thrust)
+    assert any(note.startswith("Of 3 motors only that of spin is held") for note in found.notes)
+
+
+def test_products_of_inertia_that_a_file_has_not_are_said(tmp_path):
+    path = small(tmp_path)
+    assert not any("Ixy" in note for note in read_gazebo(path).notes)
+    path.write_text(path.read_text().replace("<ixz>0.002</ixz>", "<ixz>0.002</ixz><iyz>0.01</iyz>"))
+    assert any(note.startswith("Ixy or Iyz is ") for note in read_gazebo(path).notes)
+
+
+def test_a_surface_whose_joint_is_not_there_is_one_line(tmp_path):
+    path = small(tmp_path)
+    path.write_text(path.read_text().replace("<control_joint_name>tail<", "<control_joint_name>elevator<"))
+    with pytest.raises(InputError, match="names the joint 'elevator', which the model has not"):
+        read_gazebo(path)
+
+
+def test_what_the_rotor_does_besides_pulling_follows_the_throttle(tmp_path):
+    """At the tables' points: its torque grows with the throttle, its drag with the root of it."""
+    path = small(tmp_path)
+    aircraft = read_gazebo(path).aircraft
+    level = level_flight(aircraft)
+    for throttle in (0.0, 0.01, 0.2, 1.0):
+        x = trimmed(aircraft, level) | {"throttle": np.array([throttle])}
+        error = loads(aircraft, x, throttle * aircraft.throttle.max_thrust) - theirs(path, x, aircraft)
+        assert np.abs(error / scales(aircraft, x)).max() < 1e-6
 
 
 ROTOR = "<pose>0.3 0 0 0 1.5707963 0</pose>"

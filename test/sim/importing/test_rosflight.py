@@ -100,10 +100,49 @@ def test_loads_are_those_of_the_book_at_the_tables_points(tmp_path, name):
     parameters = parameters_of(path)
     level = level_flight(aircraft)
     x = planes(aircraft, level)
-    thrust = level["throttle"] * aircraft.throttle.max_thrust
+    thrust = x["throttle"] * aircraft.throttle.max_thrust
     blend = not any(n.startswith("max_") for n in parameters)
-    error = loads(aircraft, x, thrust) - theirs(parameters, x, level["throttle"], blend=blend)
+    error = loads(aircraft, x, thrust) - theirs(parameters, x, x["throttle"], blend=blend)
     assert np.abs(error / scales(aircraft, x)).max() < 1e-6
+
+
+def test_thrust_follows_the_throttle_as_in_the_book(tmp_path):
+    """At the tables' points, where full throttle gives several times what the level flight's share promises."""
+    path = tmp_path / "small.yaml"
+    path.write_text(yaml.safe_dump({"/**": {"ros__parameters": SMALL}}))
+    aircraft = read_rosflight(path).aircraft
+    level = level_flight(aircraft)
+    throttle = np.append(np.linspace(0.4, 1.0, 13), level["throttle"])
+    for V in (level["V"], 0.8 * level["V"]):
+        x = {n: np.full(throttle.size, level.get(n, 0.0)) for n in ("alpha", "beta", "p", "q", "r", "de", "da", "dr")}
+        x |= {"V": np.full(throttle.size, V), "throttle": throttle}
+        error = loads(aircraft, x, throttle * aircraft.throttle.max_thrust) - theirs(SMALL, x, throttle, blend=True)
+        assert np.abs(error / scales(aircraft, x)).max() < 1e-6
+
+
+def test_missing_coefficients_are_said(tmp_path):
+    path = tmp_path / "small.yaml"
+    every = dict.fromkeys(("C_Y_O", "C_Y_p", "C_Y_r", "C_Y_delta_a", "C_ell_O", "C_ell_delta_r", "C_n_O"), 0.0) | SMALL
+    path.write_text(yaml.safe_dump({"/**": {"ros__parameters": every}}))
+    said = "Missing coefficients are taken as zero, as rosflight_sim takes them: C_n_delta_a."
+    assert said in read_rosflight(path).notes
+    path.write_text(yaml.safe_dump({"/**": {"ros__parameters": every | {"C_n_delta_a": 0.0}}}))
+    assert not any("Missing" in note for note in read_rosflight(path).notes)
+
+
+def test_products_of_inertia_that_a_file_has_not_are_said(tmp_path):
+    path = tmp_path / "small.yaml"
+    path.write_text(yaml.safe_dump({"/**": {"ros__parameters": SMALL | {"Jxy": -0.019, "Jyz": 0.001}}}))
+    said = "Ixy or Iyz is 10.0% of the largest moment of inertia; a file has Ixz only."
+    assert said in read_rosflight(path).notes
+
+
+def test_half_a_propeller_is_one_line(tmp_path):
+    path = tmp_path / "small.yaml"
+    parameters = {name: value for name, value in SMALL.items() if name != "R_motor"}
+    path.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters}}))
+    with pytest.raises(InputError, match="R_motor is missing"):
+        read_rosflight(path)
 
 
 def test_between_the_points_the_error_is_that_of_interpolation(tmp_path):

@@ -72,6 +72,27 @@ def test_jsbsim_holds_tables_over_the_throttle_and_servos_of_second_order(kestre
     assert {n: pytest.approx(v, rel=1e-6) for n, v in SECOND_ORDER.items()} == found.effect_values()
 
 
+def test_jsbsim_keeps_a_motor_that_lags_apart_from_the_surfaces(kestrel, tmp_path):
+    """A throttle still on its way while a surface is commanded is not moved by that surface."""
+    known = replace(kestrel, tables=(LookupTable("CD", ("throttle",), ((0.0, 0.35, 1.0),), (0.02, 0.0, -0.06)),))
+    found = from_jsbsim(known, {"motor_lag": {"time_constant": 1.0}}, tmp_path)
+    assert {table.over for table in found.tables} == {("throttle",)}
+    assert found.effect_values()["motor_lag"]["time_constant"] == pytest.approx(1.0)
+
+
+def test_jsbsim_says_which_control_it_leaves_out(kestrel, tmp_path):
+    pytest.importorskip("jsbsim", reason="JSBSim is not installed")
+    flap = replace(kestrel.controls["elevator"], name="flap", symbol="df", joints={"flap": 1.0})
+    known = replace(
+        kestrel,
+        controls=kestrel.controls | {"flap": flap},
+        derivatives=kestrel.derivatives | {"CL_df": kestrel.derivatives["CL_de"]},
+    )
+    path = tmp_path / "kestrel.xml"
+    path.write_text(jsbsim_model(known))
+    assert any("fcs/flap-position-rad" in note for note in read_jsbsim(str(path), 16.0, 0.0).notes)
+
+
 def table(coefficient, over, points, function):
     """A table whose values are a function of its points."""
     grids = np.meshgrid(*points, indexing="ij")

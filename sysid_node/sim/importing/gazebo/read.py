@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from sysid_node.sim.importing.gazebo.lift_drag import LiftDrag
 from sysid_node.sim.importing.gazebo.motion import I_GAIN, leads, motor_effects, servo_effects
 from sysid_node.sim.importing.gazebo.numbers import number_in
 from sysid_node.sim.importing.gazebo.sdf import SdfModel, masses, read_sdf
-from sysid_node.sim.importing.imported import Imported
+from sysid_node.sim.importing.imported import Imported, asymmetry_notes
 from sysid_node.sim.importing.plant import Plant, PlantEngine, PlantStates, aircraft_of, nondimensional
 
 Array = NDArray[np.float64]
@@ -50,8 +51,8 @@ def read_gazebo(path: Path, airspeed: float | None = None) -> Imported:
     """The aircraft of an SDF with AdvancedLiftDrag or LiftDrag plugins. Raises InputError."""
     model = read_sdf(path)
     plant, loads, kinds = _plant(model, path.name)
-    aircraft, level = aircraft_of(plant, airspeed)
-    return Imported(aircraft, tuple(_notes(model, loads, level.throttle, *kinds)))
+    aircraft, _ = aircraft_of(plant, airspeed)
+    return Imported(aircraft, tuple(_notes(model, loads, *kinds)))
 
 
 def gazebo_plant(path: Path) -> Plant:
@@ -73,6 +74,9 @@ def _plant(model: SdfModel, file: str) -> tuple[Plant, _Loads, tuple[bool, bool]
     mass, centre, inertia = masses(model)
     geometry, density = _geometry(simple, advanced, model.file)
     loads = _Loads(model, centre, simple, advanced, _rotor(model, centre))
+    unknown = sorted(set(loads.joints) - set(model.joints))
+    if unknown:
+        raise InputError(f"{model.file}: a lift-drag plugin names the joint {unknown[0]!r}, which the model has not")
     controls = controls_of(_power(loads, geometry, density), _limits(model, loads.joints))
     loads.controls = controls
     plant = Plant(
@@ -219,10 +223,8 @@ def _rotor(model: SdfModel, centre: Array) -> Rotor | None:
     motors = model.plugins_named("MulticopterMotorModel")
     if not motors:
         return None
-    plugin = motors[0]
-    link = (plugin.findtext("linkName") or "").strip()
-    if link not in model.links:
-        raise InputError(f"{model.file}: the motor's link {link!r} is not in the model")
+    plugin = max(motors, key=lambda motor: float(_thrust_axis(model, motor)[0]))  # of a VTOL the one that pulls forward
+    link = _motor_link(model, plugin)
     names = {
         "motorConstant": 8.54858e-06,
         "momentConstant": 0.016,
@@ -236,13 +238,26 @@ def _rotor(model: SdfModel, centre: Array) -> Rotor | None:
     return Rotor(
         joint=(plugin.findtext("jointName") or "throttle").strip(),
         place=_TURN * (body.centre - centre),
-        axis=_TURN * body.pose.axes.apply(np.array([0.0, 0.0, 1.0])),
+        axis=_thrust_axis(model, plugin),
         constants={name: number_in(plugin, name, default, model.file) for name, default in names.items()},
         turning=-1.0 if (plugin.findtext("turningDirection") or "").strip() == "cw" else 1.0,
     )
 
 
-def _notes(model: SdfModel, loads: _Loads, throttle: float, simple: bool, advanced: bool) -> list[str]:
+def _motor_link(model: SdfModel, plugin: Element) -> str:
+    """The link that a motor turns. Raises InputError where the model has it not."""
+    link = (plugin.findtext("linkName") or "").strip()
+    if link not in model.links:
+        raise InputError(f"{model.file}: the motor's link {link!r} is not in the model")
+    return link
+
+
+def _thrust_axis(model: SdfModel, plugin: Element) -> Array:
+    """The direction of a motor's thrust, forward-right-down."""
+    return _TURN * model.links[_motor_link(model, plugin)].pose.axes.apply(np.array([0.0, 0.0, 1.0]))
+
+
+def _notes(model: SdfModel, loads: _Loads, simple: bool, advanced: bool) -> list[str]:
     notes = []
     if simple:
         notes.append("LiftDrag states no span and no chord: those of the file only make coefficients non-dimensional.")
@@ -254,18 +269,26 @@ def _notes(model: SdfModel, loads: _Loads, throttle: float, simple: bool, advanc
     )
     if loads.rotor is not None:
         notes.append(
-            "The throttle is the share of full thrust, (rotor speed / maxRotVelocity)^2; the rotor's drag and torques "
-            f"are those at {throttle:.2f}."
+            "The throttle is the share of full thrust, (rotor speed / maxRotVelocity)^2; how the rotor's drag and "
+            "torques follow it is in the tables over the throttle."
         )
         up, down = loads.rotor.constants["timeConstantUp"], loads.rotor.constants["timeConstantDown"]
         if up != down:
             notes.append(f"The motor's lag is the mean of {up:g} s (up) and {down:g} s (down).")
     motors = model.plugins_named("MulticopterMotorModel")
     if len(motors) > 1:
-        notes.append(f"Of {len(motors)} motors only the first is held; a file has one throttle.")
+        joint = loads.rotor.joint if loads.rotor is not None else ""
+        notes.append(f"Of {len(motors)} motors only that of {joint} is held, the first that pulls forward most; a file "
+                     "has one throttle.")  # fmt: skip
     if any(model.includes):
         notes.append(f"Masses of included models ({', '.join(filter(None, model.includes))}) are not counted.")
-    return notes + _servo_notes(model, loads.joints)
+    inertia = masses(model)[2]
+    cross = max(abs(float(inertia[0, 1])), abs(float(inertia[1, 2])))
+    return [
+        *notes,
+        *asymmetry_notes(cross / (float(inertia.diagonal().max()) or 1.0)),
+        *_servo_notes(model, loads.joints),
+    ]
 
 
 def _servo_notes(model: SdfModel, joints: Sequence[str]) -> list[str]:

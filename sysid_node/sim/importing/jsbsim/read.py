@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +22,12 @@ from sysid_node.aircraft.model import (
 )
 from sysid_node.aircraft.names import CONTROL_SYMBOLS
 from sysid_node.sim.importing.expansion import Expansion, TableAxis, expand, largest_error
-from sysid_node.sim.importing.imported import Imported
+from sysid_node.sim.importing.imported import Imported, asymmetry_notes
 from sysid_node.sim.importing.jsbsim.actuators import JsbsimServo
 from sysid_node.sim.importing.jsbsim.coefficients import CoefficientModel
 from sysid_node.sim.importing.jsbsim.files import ModelFiles
 from sysid_node.sim.importing.jsbsim.program import Program
-from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface
+from sysid_node.sim.importing.jsbsim.surfaces import JsbsimSurface, properties_read
 from sysid_node.sim.importing.jsbsim.survey import surveyed
 from sysid_node.sim.importing.jsbsim.trim import SteadyFlight
 
@@ -69,6 +70,7 @@ def read_model(model: str, airspeed: float | None = None, altitude: float | None
         aircraft = _aircraft(survey.files, program, survey.surfaces, survey.steady, model_, expansion, survey.servos)
         notes = [
             *_notes(program, survey.surfaces, survey.steady, model_, survey.servos),
+            *_unmoved(program, survey.surfaces, aerodynamics),
             *_remainder(model_, expansion, axes),
         ]
         imported = Imported(aircraft, tuple(notes))
@@ -171,10 +173,7 @@ def _notes(
             notes.append(f"The {surface.name} moves from {low:.3f} to {high:.3f} rad; a file has one limit both ways.")
         if not surface.position.endswith(("-rad", "-deg")):
             notes.append(f"The {surface.name}'s joint is {surface.position}, without unit, for there is none in rad.")
-    if program.cross_products > 1e-3:
-        notes.append(
-            f"Ixy or Iyz is {program.cross_products:.1%} of the largest moment of inertia; a file has Ixz only."
-        )
+    notes += asymmetry_notes(program.cross_products)
     left = [
         n for n, v in zip(("CD", "CY", "Cl", "Cn"), model.unsteady.slopes[[1, 2, 3, 5]], strict=True) if abs(v) > 0.01
     ]
@@ -190,6 +189,16 @@ def _notes(
         "The IMU's place is the model's eye point, the pilot's; flow angles are those at the centre of gravity."
     )
     return notes
+
+
+def _unmoved(program: Program, surfaces: Sequence[JsbsimSurface], aerodynamics: Sequence[Element]) -> list[str]:
+    """What of the flight control system the aerodynamics read besides the three controls and the throttle."""
+    moved = {name for surface in surfaces for name in surface.properties}
+    left = sorted(n for n in properties_read(aerodynamics) - moved if program.has(n) and "throttle" not in n)
+    if not left:
+        return []
+    return [f"The aerodynamics also read {', '.join(left)}, which neither elevator, aileron nor rudder moves; a file "
+            "of JSBSim has no such control, and they are held as they are without a command."]  # fmt: skip
 
 
 def _thrust_note(steady: SteadyFlight, model: CoefficientModel) -> str:

@@ -22,8 +22,12 @@ _POSITIONS = {
     "rudder": ("fcs/rudder-pos-rad",),
 }
 
-#: How long a flight control system is left to come to rest, s.
+#: How long a flight control system is left to come to rest after a command, s.
 _REST = 3.0
+
+#: How often it is left so long before the first command, until nothing moves by more than this: a throttle that lags
+#: would still be on its way, and would pass for something that the command moves.
+_FIRST_RESTS, _STILL = 40, 1e-9
 
 
 @dataclass(frozen=True)
@@ -124,6 +128,7 @@ def _probe(
     """The control of a command; None where the command moves nothing that the aerodynamics read."""
     candidates = [p for p in _POSITIONS[name] if program.has(p)]
     names = list(dict.fromkeys([*read, *candidates]))
+    _come_to_rest(program, state, names, rate)
     commands = np.linspace(-1.0, 1.0, 9)
     values = np.array([_rest(program, state, {command: float(c)}, names, rate) for c in commands])
     moved = [n for n, column in zip(names, values.T, strict=True) if np.ptp(column) > 1e-6]
@@ -147,6 +152,16 @@ def _probe(
         {n: column[rising] for n, column in columns.items()},
         feedback=bool(abs(other - at_rest) * unit > 1e-3 * max(np.ptp(deflection), 1e-9)),
     )
+
+
+def _come_to_rest(program: Program, state: Flight, names: Sequence[str], rate: float) -> None:
+    """Run without commands until what lags, such as the throttle, has settled."""
+    before = _rest(program, state, {}, names, rate)
+    for _ in range(_FIRST_RESTS):
+        after = _rest(program, state, {}, names, rate)
+        if np.allclose(after, before, rtol=0.0, atol=_STILL):
+            return
+        before = after
 
 
 def _elsewhere(state: Flight) -> Flight:
