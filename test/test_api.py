@@ -152,6 +152,7 @@ def test_a_table_for_pandas(replayed, flight):
         (lambda: load(BAG, "cdrw", body_frame="FRD"), "body_frame = 'FRD': expected one of flu, frd"),
         (lambda: load([BAG], "cdrw"), "expected the path of one bag or log"),
         (lambda: replay(str(BAG)), "expected what load(path, aircraft) returns"),
+        (lambda: replay([load(BAG, "cdrw"), load(BAG, "cdrw")]), "flight: got 2 flights, expected one"),
         (lambda: identify([load(BAG, "cdrw"), BAG], "equation_error"), "flights: got"),
         (lambda: identify(load(BAG, "cdrw"), "equation_error", holdout=str(BAG)), "holdout: got"),
         (lambda: identify(load(BAG, "cdrw"), None), "method None: expected one of equation_error"),

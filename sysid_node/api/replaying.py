@@ -150,7 +150,10 @@ def replay(
     Raises InputError where a setting is wrong, the bag cannot be read, lacks a joint of the aircraft, or gives no
     sample.
     """
-    (flight,) = flight_list(flight, "flight")
+    flights = flight_list(flight, "flight")
+    if len(flights) != 1:
+        raise InputError(f"flight: got {len(flights)} flights, expected one")
+    (flight,) = flights
     chosen, publish_rate = replay_settings(settings or {})
     truth = truth_at_end(flight.path)
     tell: Progress = progress or (lambda share, doing: None)
