@@ -151,7 +151,7 @@ def _with_late_imu(cause: Cause, chosen: FittedSet) -> Cause:
 def _successor(base: FittedSet, position: CauseAlternatives, cause: Cause, barred: frozenset[str]) -> FittedSet | None:
     """The explanation with the alternative that takes a challenged cause's place; none where there is none."""
     shares = dict(cause.alternatives)
-    wrong = cause.fit if is_supported_but_misspecified(cause.evidence) else None
+    wrong = cause.evidence if is_supported_but_misspecified(cause.evidence) else None
     scores = [_Successor(base, position.without, each, shares, wrong) for each in position.alternatives if each.added]
     found = successor(scores, barred)
     return None if found is None else scores[found].fitted
@@ -165,7 +165,7 @@ class _Successor:
     without: FittedSet
     fitted: FittedSet
     shares: dict[str, float]
-    wrong: CandidateFit | None  # the explanation with the cause, where its equation is wrong: what may be imitated
+    wrong: CauseEvidence | None  # that of the cause, where its equation is wrong: what may be imitated
 
     @property
     def added(self) -> Candidate:
@@ -190,10 +190,10 @@ class _Successor:
 
     @cached_property
     def probability(self) -> float:
-        imitated = 0.0
-        if self.wrong is not None and is_flexible(self.added.effect):
-            imitated = _probability_against(self.fitted.fit, self.wrong)
-        return (1.0 - imitated) * calibrated_probability(_evidence(self.fitted, self.without, self.added))
+        evidence, imitated = _evidence(self.fitted, self.without, self.added), 0.0
+        if self.wrong is not None and evidence.flexible:
+            imitated = float(expit(self.wrong.log_bayes_factor - evidence.log_bayes_factor))
+        return (1.0 - imitated) * calibrated_probability(evidence)
 
 
 def _evidence(fitted: FittedSet, without: FittedSet, candidate: Candidate) -> CauseEvidence:
@@ -251,18 +251,13 @@ def _imitated(
     labels = {each.candidate.label for each in rejected if is_supported_but_misspecified(each.evidence)}
     if not is_flexible(position.candidate.effect):
         return 0.0
-    found = [0.0]
+    found, without = [0.0], position.without.fit
     for each in position.alternatives:
         if each.added and each.added.label in labels and each.added.effect != position.candidate.effect:
             both = fitter.add_candidate(chosen, each.added)
-            best = max((one for one in (chosen, both) if one), key=lambda one: one.evidence.total)
-            found.append(_probability_against(best.fit, each.fit))
+            own = max(log_bayes_factor(one.fit, without) for one in (chosen, both) if one)
+            found.append(float(expit(log_bayes_factor(each.fit, without) - own)))
     return max(found)
-
-
-def _probability_against(fit: CandidateFit, other: CandidateFit) -> float:
-    """Probability of another explanation against this one, by what the commands predict."""
-    return float(expit(-_lead(fit, other)))
 
 
 def _shares(sets: Sequence[FittedSet], others: Sequence[FittedSet]) -> Array:
