@@ -148,6 +148,7 @@ def _grounds(cause: Cause) -> dict[str, Any]:
         "tolerances": evidence.by_tolerances,
         "misspecification": evidence.misspecification,
         "flexible": evidence.flexible,
+        "imitation": cause.imitation,
     }
 
 

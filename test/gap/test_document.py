@@ -42,7 +42,8 @@ def test_the_best_of_the_list_is_not_there_for_that(lagging) -> None:
 def test_a_cause_has_the_keys_of_the_contract(lagging) -> None:
     (cause,) = document(lagging)["causes"]
     assert {"effect", "parameters", "probability", "gap_after", "indistinguishable_from"} <= cause.keys()
-    assert cause["grounds"].keys() == {"share", "log_bayes_factor", "tolerances", "misspecification", "flexible"}
+    expected = {"share", "log_bayes_factor", "tolerances", "misspecification", "flexible", "imitation"}
+    assert cause["grounds"].keys() == expected
     assert cause["gap_after"] == lagging.size.after == document(lagging)["gap"]["after"]
 
 

@@ -15,15 +15,13 @@ import numpy as np
 from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, TIME_EFFECTS, Candidate
 from sysid_node.gap.instruments.bayes_factor import log_bayes_factor_of_alternatives
 from sysid_node.gap.selection.acceptance import is_accepted
+from sysid_node.gap.selection.calibration import is_flexible
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison
 from sysid_node.gap.selection.fitted_set import FittedSet
 from sysid_node.gap.selection.replacement import Step, are_alike, are_as_stated, next_step
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim.model.parameters import stated_parameters
-
-#: Effects that can imitate others: in their place everything is tried that was fitted alone.
-_FLEXIBLE = THRESHOLDS.calibration.flexible_effects
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ def _alternatives(
     screened = fitter.screen_upon([without], rest, lambda share, text: None)
     likely = screened[: THRESHOLDS.search.alternatives] if others else []
     rest_screened = screened[len(likely) :]
-    alone = {each.added.label for each in first if each.added} if cause.effect in _FLEXIBLE else set()
+    alone = {each.added.label for each in first if each.added} if is_flexible(cause.effect) else set()
     close = [p for p in rest_screened if _is_close(p.screened.candidate, cause) or p.screened.candidate.label in alone]
     fitted = fitter.fit_screened([*likely, *close], lambda share, text: None)
     by_label = {} if others else {each.added.label: each for each in first if each.added}

@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit
 
 from sysid_node.gap.selection.misspecification import Misspecification
 from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
@@ -93,6 +94,11 @@ def regressors(evidence: CauseEvidence, thresholds: Thresholds = THRESHOLDS) -> 
 def is_flexible(effect: str, thresholds: Thresholds = THRESHOLDS) -> bool:
     """Whether an effect acts as other values of the derivatives, so that it can imitate other effects."""
     return effect in thresholds.calibration.flexible_effects
+
+
+def imitation(own: float, imitated: float) -> float:
+    """Probability that an effect only imitates another, from the log Bayes factor (nats) of each."""
+    return float(expit(imitated - own))
 
 
 def prior_odds(effect: str, thresholds: Thresholds = THRESHOLDS) -> float:

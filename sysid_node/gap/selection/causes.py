@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import expit
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit
@@ -26,6 +25,7 @@ from sysid_node.gap.selection.calibration import (
     CauseEvidence,
     calibrated_probability,
     evidence_of,
+    imitation,
     is_flexible,
     is_supported_but_misspecified,
     prior_odds,
@@ -63,7 +63,7 @@ class Cause:
     without: FittedSet  # the explanation without it
     replaced: bool = False  # whether a probable alternative took its place
     plausible: bool = True  # whether real parts are off as far as it is in this explanation
-    imitated: float = 0.0  # probability that it only imitates an effect that was rejected for its equation
+    imitation: float = 0.0  # probability that it only imitates an effect that was rejected for its equation
 
     @property
     def probability(self) -> float:
@@ -73,13 +73,13 @@ class Cause:
     @property
     def probability_of_any(self) -> float:
         """Probability that it, or an alternative named with it, is there; zero where its size is not plausible."""
-        return calibrated_probability(self.evidence) * (1.0 - self.imitated) if self.plausible else 0.0
+        return calibrated_probability(self.evidence) * (1.0 - self.imitation) if self.plausible else 0.0
 
     @property
     def table(self) -> CauseTable:
         """The scores that decide whether it is kept."""
         largest = max((share for _, share in self.alternatives), default=0.0)
-        by_support = probability_by_support(self.evidence) * (1.0 - self.imitated) if self.plausible else 0.0
+        by_support = probability_by_support(self.evidence) * (1.0 - self.imitation) if self.plausible else 0.0
         return CauseTable(self.candidate.label, self.share, largest, self.probability_of_any, by_support)
 
 
@@ -118,8 +118,8 @@ def select_causes(
     ``chosen`` is the explanation of the forward selection with its ``stages``; candidates that are ``always`` tried
     are alternatives to any cause. ``base`` has nuisances only. What was ``rejected_before`` does not come back.
 
-    A flexible effect imitates others. Where one of these was rejected because its equation is wrong, but what the
-    commands predict supports it more, the flexible effect is not more probable than it was beside it.
+    A flexible effect imitates others. Where one of these was rejected because its equation is wrong, the flexible
+    effect is only as probable as its log Bayes factor makes it against that one.
     """
     rejected = list(rejected_before)
     challenged: frozenset[str] = frozenset()
@@ -190,10 +190,11 @@ class _Successor:
 
     @cached_property
     def probability(self) -> float:
-        evidence, imitated = _evidence(self.fitted, self.without, self.added), 0.0
-        if self.wrong is not None and evidence.flexible:
-            imitated = float(expit(self.wrong.log_bayes_factor - evidence.log_bayes_factor))
-        return (1.0 - imitated) * calibrated_probability(evidence)
+        evidence = _evidence(self.fitted, self.without, self.added)
+        probability = calibrated_probability(evidence)
+        if self.wrong is None or not evidence.flexible:
+            return probability
+        return probability * (1.0 - imitation(evidence.log_bayes_factor, self.wrong.log_bayes_factor))
 
 
 def _evidence(fitted: FittedSet, without: FittedSet, candidate: Candidate) -> CauseEvidence:
@@ -237,26 +238,26 @@ def _weighed(
         alternative_sets=position.alternatives,
         without=without,
         plausible=is_plausible(Comparison(base, without, replace(chosen, added=candidate))),
-        imitated=_imitated(fitter, chosen, position, rejected),
+        imitation=_imitation(fitter, chosen, position, rejected),
     )
 
 
-def _imitated(
+def _imitation(
     fitter: CandidateFitter, chosen: FittedSet, position: CauseAlternatives, rejected: Sequence[Cause]
 ) -> float:
-    """Probability by what the commands predict that a cause only imitates an effect that was rejected for its equation.
+    """Probability that a cause only imitates an effect that was rejected for its equation, which a flexible one can.
 
-    Only a flexible effect can. What the rejected effect explains besides is no imitation.
+    It is from what the commands predict, of the cause alone or of both together, whichever they support more.
     """
-    labels = {each.candidate.label for each in rejected if is_supported_but_misspecified(each.evidence)}
     if not is_flexible(position.candidate.effect):
         return 0.0
+    labels = {each.candidate.label for each in rejected if is_supported_but_misspecified(each.evidence)}
     found, without = [0.0], position.without.fit
     for each in position.alternatives:
         if each.added and each.added.label in labels and each.added.effect != position.candidate.effect:
             both = fitter.add_candidate(chosen, each.added)
             own = max(log_bayes_factor(one.fit, without) for one in (chosen, both) if one)
-            found.append(float(expit(log_bayes_factor(each.fit, without) - own)))
+            found.append(imitation(own, log_bayes_factor(each.fit, without)))
     return max(found)
 
 

@@ -11,6 +11,7 @@ from sysid_node.gap.selection.calibration import (
     CauseEvidence,
     calibrated_probability,
     evidence_of,
+    imitation,
     is_misspecified,
     is_supported_but_misspecified,
     misspecification_of,
@@ -121,3 +122,10 @@ def test_nats_by_tolerances_count_as_they_are_against_what_was_searched() -> Non
     assert calibrated_probability(found) == pytest.approx(odds / (1.0 + odds))
     assert calibrated_probability(replace(found, by_tolerances=0.0)) < 0.2
     assert evidence_of("mass_error", -3.0, tested, LIMITS.windows, by_tolerances=20.0).by_tolerances == 0.0
+
+
+def test_an_effect_may_imitate_another_as_far_as_that_is_supported_more() -> None:
+    """Truth: odds of e to the difference of the log Bayes factors."""
+    assert imitation(7.0, 7.0) == pytest.approx(0.5)
+    assert imitation(10.0, 20.0) == pytest.approx(1.0 / (1.0 + np.exp(-10.0)))
+    assert (imitation(1e6, 0.0), imitation(0.0, 1e6)) == (0.0, 1.0)

@@ -64,7 +64,7 @@ def test_what_is_there_besides_is_no_imitation(mistaken) -> None:
     stage = [shift, fitter.add_candidate(base, candidates["command_delay"])]
     _, causes, rejected = select_causes(fitter, base, shift, [stage], [], [rejected_for_its_equation(mistaken)])
     (cause,) = (each for each in (*causes, *rejected) if each.candidate.effect == "cg_shift")
-    assert cause.imitated < 1e-6
+    assert cause.imitation < 1e-6
 
 
 def test_its_probability_is_its_share_of_the_calibrated_one(selected) -> None:
