@@ -143,8 +143,8 @@ def test_a_servo_without_a_controller_is_a_line(model, tmp_path):
     ("was", "is_now", "said"),
     [
         ("AdvancedLiftDrag", "LiftDrag", "it needs one plugin AdvancedLiftDrag and no LiftDrag"),
-        ('elevator"', 'stabilator"', "names the joint 'elevator', which the model has not"),
-        ("elevator<", "stabilator<", "names the joint 'stabilator', which the model has not"),
+        ('elevator"', 'stabilator"', "names the joint 'elevator', which the model does not have"),
+        ("elevator<", "stabilator<", "names the joint 'stabilator', which the model does not have"),
         ("elevator", "stabilator", "has other controls; it must be read from this file"),
     ],
 )

@@ -347,7 +347,7 @@ def test_products_of_inertia_that_a_file_has_not_are_said(tmp_path):
 def test_a_surface_whose_joint_is_not_there_is_one_line(tmp_path):
     path = small(tmp_path)
     path.write_text(path.read_text().replace("<control_joint_name>tail<", "<control_joint_name>elevator<"))
-    with pytest.raises(InputError, match="names the joint 'elevator', which the model has not"):
+    with pytest.raises(InputError, match="names the joint 'elevator', which the model does not have"):
         read_gazebo(path)
 
 
@@ -394,7 +394,10 @@ def test_poses_are_in_degrees_and_relative_where_they_say_so(tmp_path, pose):
 
 @pytest.mark.parametrize(
     ("base", "said"),
-    [("nose", "link 'rotor' stands relative to 'nose', which the model has not"), ("rotor", "stands in a circle")],
+    [
+        ("nose", "link 'rotor' stands relative to 'nose', which the model does not have"),
+        ("rotor", "stands in a circle"),
+    ],
 )
 def test_a_pose_relative_to_nothing_is_one_line(tmp_path, base, said):
     path = small(tmp_path)

@@ -50,7 +50,11 @@ class SdfFrames:
             return own
         asked = (*seen, name)
         if base not in self._elements or base in asked:
-            why = f"stands relative to {base!r}, which the model has not" if base not in asked else "stands in a circle"
+            why = (
+                f"stands relative to {base!r}, which the model does not have"
+                if base not in asked
+                else "stands in a circle"
+            )
             raise InputError(f"{self._file}: {element.tag} {name!r} {why}; correct its <pose>")
         return self._of(self._elements[base], asked).then(own)
 

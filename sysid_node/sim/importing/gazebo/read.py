@@ -70,13 +70,17 @@ def _plant(model: SdfModel, file: str) -> tuple[Plant, _Loads, tuple[bool, bool]
         )
     missing = {name for name in (*(w.link for w in simple), *(w.link for w in advanced)) if name not in model.links}
     if missing:
-        raise InputError(f"{model.file}: a lift-drag plugin names the link {min(missing)!r}, which the model has not")
+        raise InputError(
+            f"{model.file}: a lift-drag plugin names the link {min(missing)!r}, which the model does not have"
+        )
     mass, centre, inertia = masses(model)
     geometry, density = _geometry(simple, advanced, model.file)
     loads = _Loads(model, centre, simple, advanced, _rotor(model, centre))
     unknown = sorted(set(loads.joints) - set(model.joints))
     if unknown:
-        raise InputError(f"{model.file}: a lift-drag plugin names the joint {unknown[0]!r}, which the model has not")
+        raise InputError(
+            f"{model.file}: a lift-drag plugin names the joint {unknown[0]!r}, which the model does not have"
+        )
     controls = controls_of(_power(loads, geometry, density), _limits(model, loads.joints))
     loads.controls = controls
     plant = Plant(
