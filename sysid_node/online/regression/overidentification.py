@@ -5,7 +5,8 @@ unknowns. If the model is right and gusts do not move the surfaces, the estimate
 
     J = min over theta of  sum_b (Z_b'(y - X theta))' [S_b Z_b'K Z_b]^-1 (Z_b'(y - X theta))
 
-which has the chi-squared distribution with (B - 1) p degrees of freedom, p unknowns (Sargan, Econometrica 26, 1958;
+where S_b is the residual's density in a band and K the correlation of its lines. It has the chi-squared distribution
+with (B - 1) p degrees of freedom, p unknowns (Sargan, Econometrica 26, 1958;
 Hansen, Econometrica 50, 1982; by bands of frequencies: Engle, International Economic Review 15, 1974). Gusts are
 strongest at low frequencies. If an autopilot answers them, low bands tell smaller derivatives than high ones do. A
 derivative that the model lacks, or a time that is wrong, also acts differently in each band. J is then many times its

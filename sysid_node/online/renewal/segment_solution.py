@@ -117,7 +117,7 @@ def _time_errors(state: EstimatorState, systematic: SystematicErrors | None) -> 
 def _variance_factors(found: SolvedEquations, recorded: Solution, systematic: SystematicErrors | None) -> Array:
     """(C, P) variances over those that the ``recorded`` signals' solution has by its residual alone."""
     factors = found.inflation if systematic is None else found.inflation * systematic.considered.overdispersion
-    # all of these tell that the errors are larger than the residuals say, and none of them why: the largest counts
+    # both tell that the errors are larger than the residuals say, and may tell of the same cause: the larger counts
     factors = np.maximum(factors, found.scatter)
     variance = factors[:, None] * found.spread.covariance.diagonal(axis1=1, axis2=2)
     scale = recorded.residual[:, None] * np.abs(recorded.inverse.diagonal())

@@ -65,7 +65,7 @@ def solved_equations(state: EstimatorState, total: Information, gram: Array) -> 
 
 
 def _scatter(equations: NormalEquations, solution: Solution, total: Information, spread: Uncertainty) -> Array:
-    """(C,) how many times the variances of the estimates are as large as one band's residuals say."""
+    """(C,) factors of the variances by the scatter of the bands' estimates; one where too little was measured."""
     if not solution.usable or total.trace_square <= 0.0:
         return np.ones(equations.outputs.size)
     found = overidentification.overidentification(equations, solution, total, spread)
