@@ -1,13 +1,15 @@
 """Coverage of the intervals where everything is a little off at once.
 
-    python -m bench.estimation.all_imperfections RESULTS.jsonl [--flights 60] [--first 1] [--replay] [--page FILE]
+    python -m bench.estimation.all_imperfections RESULTS.jsonl [--flights 60] [--first 1] [--replay | --others]
+        [--page FILE]
 
 Each flight is that of `sysid simulate --aircraft cdrw --manoeuvre 3211:repeat=3`, with imperfections drawn as aircraft
 have them: servos of first order (20 to 120 ms) or second (3 to 12 Hz), rate limits of 2 to 6 rad/s, delays up to 40 ms,
 late gyroscopes and air data, and every tolerance of the aircraft file at its size. The estimators have the commands
 alone. Of the servos the aircraft file is right, wrong by its tolerances, or silent. A flight's number is the seed of
-all that is drawn, so that results can be continued; they are appended line by line. `--page` makes the tables, and
-`--replay` those of the online estimator alone.
+all that is drawn, so that results can be continued; they are appended line by line. `--page` makes the tables,
+`--replay` those of the online estimator alone, and `--others` that of the online estimator on other aircraft and by
+multisine, so many flights of each.
 """
 
 from __future__ import annotations
@@ -38,6 +40,8 @@ from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import Sortie, SortieConditions, fly_sortie
 
 MANOEUVRE, RATE, COMMAND_RATE = "3211:repeat=3", 1000.0, 100.0  # Hz, of the simulation and of the autopilot
+MULTISINE = "multisine:every=22:repeat=2"
+OTHERS = (("cdrw", MULTISINE), ("cdfp", MANOEUVRE), ("cdfp", MULTISINE), ("kestrel", MANOEUVRE), ("kestrel", MULTISINE))
 AIRS, ORDERS, FILES = ("none", "light", "moderate"), ("first", "second"), ("right", "wrong", "silent")
 METHODS = ("replay", "equation_error")
 
@@ -102,9 +106,9 @@ def known(aircraft: Aircraft, kind: Mapping[str, str], effects: Effects, number:
     return replace(aircraft, effects=stated)
 
 
-def fly(simulator: Simulator, effects: Effects, air: str, seed: int) -> Sortie:
+def fly(simulator: Simulator, effects: Effects, air: str, seed: int, manoeuvre: str = MANOEUVRE) -> Sortie:
     """One flight at the hands of the autopilot."""
-    plan = parse_manoeuvre(MANOEUVRE, simulator.aircraft, RATE)
+    plan = parse_manoeuvre(manoeuvre, simulator.aircraft, RATE)
     moves = np.column_stack([plan.surfaces(), np.zeros(plan.time.size)])
     return fly_sortie(simulator, moves, SortieConditions(effects, turbulence=air, seed=seed, command_rate=COMMAND_RATE))
 
@@ -122,10 +126,16 @@ def estimated(method: str, aircraft: Aircraft, streams: Streams, carried: str) -
     return fit.estimates, fit.systematic.servos
 
 
-def flown(simulator: Simulator, aircraft: Aircraft, number: int, methods: Sequence[str] = METHODS) -> dict[str, Any]:
+def flown(
+    simulator: Simulator,
+    aircraft: Aircraft,
+    number: int,
+    methods: Sequence[str] = METHODS,
+    manoeuvre: str = MANOEUVRE,
+) -> dict[str, Any]:
     """One line of the results: of each method the rows of derivatives and servos, and how many were valid without."""
     kind, effects = drawn(aircraft, number)
-    sortie = fly(simulator, effects, kind["air"], number)
+    sortie = fly(simulator, effects, kind["air"], number, manoeuvre)
     streams, file = FlightSampler().record(sortie), known(aircraft, kind, effects, number)
     truth, line = sortie.derivatives, {"number": number, **kind, "effects": effects}
     damping = effects["actuator_lag"].get("damping")
@@ -137,7 +147,9 @@ def flown(simulator: Simulator, aircraft: Aircraft, number: int, methods: Sequen
         derivatives, servos = estimated(method, file, streams, "auto")
         line[method] = {name: _row(d, truth[name]) for name, d in derivatives.items()}
         line[f"{method}_servos"] = {name: _row(d, late[name]) for name, d in servos.items()}
-    exact = FlightSampler(actuator_rate=200.0, surfaces="measured").record(fly(simulator, {}, kind["air"], number))
+    exact = FlightSampler(actuator_rate=200.0, surfaces="measured").record(
+        fly(simulator, {}, kind["air"], number, manoeuvre)
+    )
     ideal = replace(aircraft, ideal=True, noise_bias=dict.fromkeys(aircraft.noise_bias, 0.0))
     line["valid_exact"] = sum(d.valid for d in estimated("replay", ideal, exact, "positions")[0].values())
     return line
@@ -198,6 +210,31 @@ def tables(lines: list[dict[str, Any]], methods: Sequence[str] = METHODS) -> str
     return f"{table(heads, body)}\n\n{table(second, each)}"
 
 
+def others(path: Path, numbers: Sequence[int]) -> str:
+    """The table of flights of other aircraft and manoeuvres, those that are missing in a file of results flown."""
+    lines, rows = _read(path), []
+    for name, manoeuvre in OTHERS:
+        aircraft = load_aircraft(name)
+        simulator = Simulator(aircraft, RATE)
+        which = {"aircraft": name, "manoeuvre": manoeuvre}
+        for number in numbers:
+            if not any({**line, **which, "number": number} == line for line in lines):
+                lines.append({**which, **flown(simulator, aircraft, number, METHODS[:1], manoeuvre)})
+                _append(path, lines[-1])
+        some = [line for line in lines if {**line, **which} == line and line["number"] in numbers]
+        exact = f"{np.mean([line['valid_exact'] for line in some]):.1f}"
+        words = f"`{name}`, {manoeuvre.split(':')[0].replace('3211', '3-2-1-1')}"
+        rows.append([words, str(len(some)), exact, *counted(some, "replay"), *counted(some, "replay_servos")])
+    counts = ("valid", "hold", "> 4 s.e.")
+    heads = ("flights", "number", "valid, exact", *counts, *(f"servos: {c}" for c in counts))
+    return table(heads, rows)
+
+
+def _append(path: Path, line: Mapping[str, Any]) -> None:
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(line) + "\n")
+
+
 def _read(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
 
@@ -209,16 +246,21 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=60, help="how many flights (default: 60)")
     parser.add_argument("--first", type=int, default=1, help="number of the first flight (default: 1)")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
-    parser.add_argument("--replay", action="store_true", help="the online estimator alone")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--replay", action="store_true", help="the online estimator alone")
+    which.add_argument("--others", action="store_true", help="other aircraft and manoeuvres")
     args = parser.parse_args()
+    numbers = range(args.first, args.first + args.flights)
+    if args.others:
+        publish("bench/estimation/all_imperfections.py others", others(args.results, numbers), args.page)
+        return
     lines, methods = _read(args.results), METHODS[:1] if args.replay else METHODS
     aircraft = load_aircraft("cdrw")
     simulator = Simulator(aircraft, RATE)
-    for number in range(args.first, args.first + args.flights):
+    for number in numbers:
         if all(line["number"] != number for line in lines):
             lines.append(flown(simulator, aircraft, number, methods))
-            with args.results.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(lines[-1]) + "\n")
+            _append(args.results, lines[-1])
     section = f"bench/estimation/all_imperfections.py{' replay' if args.replay else ''}"
     publish(section, tables(lines, methods), args.page)
 
