@@ -210,10 +210,14 @@ def tables(lines: list[dict[str, Any]], methods: Sequence[str] = METHODS) -> str
     return f"{table(heads, body)}\n\n{table(second, each)}"
 
 
-def others(path: Path, numbers: Sequence[int]) -> str:
-    """The table of flights of other aircraft and manoeuvres, those that are missing in a file of results flown."""
+def others(path: Path, first: int, flights: int) -> str:
+    """The table of so many flights of each of the others, from the first number on, no number twice.
+
+    Those that are missing in a file of results are flown.
+    """
     lines, rows = _read(path), []
-    for name, manoeuvre in OTHERS:
+    for place, (name, manoeuvre) in enumerate(OTHERS):
+        numbers = range(first + place * flights, first + (place + 1) * flights)
         aircraft = load_aircraft(name)
         simulator = Simulator(aircraft, RATE)
         which = {"aircraft": name, "manoeuvre": manoeuvre}
@@ -252,7 +256,9 @@ def main() -> None:
     args = parser.parse_args()
     numbers = range(args.first, args.first + args.flights)
     if args.others:
-        publish("bench/estimation/all_imperfections.py others", others(args.results, numbers), args.page)
+        publish(
+            "bench/estimation/all_imperfections.py others", others(args.results, args.first, args.flights), args.page
+        )
         return
     lines, methods = _read(args.results), METHODS[:1] if args.replay else METHODS
     aircraft = load_aircraft("cdrw")
