@@ -40,6 +40,7 @@ from sysid_node.ros.support.loop_node import (
     LATEST,
     SET_POINT_QOS,
     SET_POINTS,
+    STANDING,
     LoopNode,
     by_name,
     named,
@@ -164,7 +165,8 @@ class AdaptiveController(LoopNode):
         values |= {f"inputs: {what}": count for what, count in self._state.checks.counts.items()}
         line = "; ".join(f"{axis.axis.name}: {axis.verdict}" for axis in self._state.axes)
         if self._imu.silent() or not self._imu_count:
-            return DiagnosticStatus.ERROR, f"{self._imu.topic} silent: surfaces at level flight's; {line}", values
+            silent = f": {STANDING}" if self._stamps_stand() else " silent"
+            return DiagnosticStatus.ERROR, f"{self._imu.topic}{silent}: surfaces at level flight's; {line}", values
         troubles += [f"{subject}: {text}" for subject, text in self.present.items()]
         line = "; ".join([line, *troubles])
         return DiagnosticStatus.WARN if self._state.stale or troubles else DiagnosticStatus.OK, line, values
@@ -172,6 +174,8 @@ class AdaptiveController(LoopNode):
     def conditions(self) -> Mapping[str, str]:
         """What arrived and was left out or clipped, surfaces at their limits, and a large tracking error."""
         present, self._wrong = self._wrong, {}
+        if self._stamps_stand():
+            present[self._imu.topic] = f"{STANDING}: surfaces at level flight's"
         counts, before = self._state.checks.counts, self._checked
         present |= {f"input {what}": f"{n - before[what]} times" for what, n in counts.items() if n > before[what]}
         self._checked = Counter(counts)
@@ -231,6 +235,10 @@ class AdaptiveController(LoopNode):
         wrong = self._points.receive(time.monotonic(), values)
         if wrong:
             self._wrong[self.inputs[SET_POINTS].name] = "; ".join(wrong)
+
+    def _stamps_stand(self) -> bool:
+        """Whether the IMU counts as silent although messages come: none is newer than those before it."""
+        return self._imu.silent() and self.inputs[IMU].waited() <= IMU_AGE
 
     def _watch(self) -> None:
         """Without an IMU: no feedback, and the surfaces return to their positions in level flight."""

@@ -294,6 +294,19 @@ def test_a_misspelt_set_point_is_said(client: Client, vehicles: Vehicles) -> Non
     client.until(said)
 
 
+def test_stamps_that_stand_still_count_as_silence(client: Client, vehicles: Vehicles) -> None:
+    """The controller had sent no more commands, and said nothing in its log; an excitation would never have ended."""
+    words = "its stamps do not advance, messages are left out"
+    client.stamp = client.node.get_clock().now().nanoseconds
+    client.until(lambda: f"/uav1/imu/data: {words}: surfaces at level flight's" in client.said(CONTROLLER))
+    client.until(lambda: f"/uav1/imu/data: {words}" in vehicles.log("adaptive_controller"))
+    client.until(lambda: f"/uav3/imu/data: {words}" in client.said("uav3/exciter: state"))
+    client.commands.clear()
+    client.until(lambda: len(client.commands) > 20)
+    client.stamp = 0
+    client.until(lambda: words not in client.said(CONTROLLER))
+
+
 def test_silence_is_said_under_the_resolved_name(client: Client, vehicles: Vehicles) -> None:
     client.flies = False
     client.until(lambda: "/uav1/imu/data silent" in client.said(CONTROLLER))

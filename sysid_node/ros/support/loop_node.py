@@ -50,6 +50,8 @@ LAST_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 #: The parameter of the nodes that model the surfaces.
 LAG = ("actuator_lag", "s", "First-order lag of the surfaces behind their commands.", "For every aircraft.")
+#: What is said of a topic whose messages are left out for their stamps.
+STANDING = "its stamps do not advance, messages are left out"
 EFFECT = "They take effect when the node starts; effects of the flight_simulator at any time."
 
 
