@@ -20,6 +20,7 @@ from sysid_node.control.design.plant import CONTROLS
 from sysid_node.control.inputs.estimates import identified_derivatives
 from sysid_node.control.inputs.set_point_input import SetPointInput
 from sysid_node.control.law.allocation import Allocation
+from sysid_node.control.law.reference import set_point_limits
 from sysid_node.control.settings import RANGES, ControllerSettings
 from sysid_node.control.types import Command, Measurements
 from sysid_node.flight.live import messages
@@ -126,9 +127,12 @@ class AdaptiveController(LoopNode):
 
     def __init__(self) -> None:
         super().__init__("adaptive_controller", PARAMETERS)
-        self._state = controller.init(self.aircraft, ControllerSettings.from_mapping(self.values))
+        settings = ControllerSettings.from_mapping(self.values)
+        self._state = controller.init(self.aircraft, settings)
         self._allocation = Allocation.of(self.aircraft)
-        self._points = SetPointInput(self.values["set_points_expire_after"])
+        self._points = SetPointInput(
+            settings.set_points_expire_after, set_point_limits(self.aircraft.reference.airspeed, settings)
+        )
         self._air: tuple[float, tuple[float, ...]] = (-math.inf, (math.nan,) * 4)  # time, values
         self._extra: tuple[float, list[float]] = (-math.inf, [0.0] * len(CONTROLS))
         self._now, self._imu_count, self._steps_without_imu = math.nan, 0, 0

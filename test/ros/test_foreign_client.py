@@ -294,6 +294,17 @@ def test_a_misspelt_set_point_is_said(client: Client, vehicles: Vehicles) -> Non
     client.until(said)
 
 
+def test_a_set_point_in_degrees_is_said(client: Client, vehicles: Vehicles) -> None:
+    """The limit is flown; nothing had said so."""
+    words = "/uav1/set_points: set-point 'roll' of 20 rad is beyond -0.8 to 0.8 rad: the limit is flown"
+
+    def said() -> bool:
+        client.points.publish(client.joints({"roll": 20.0}))
+        return words in client.said(CONTROLLER) and words in vehicles.log("adaptive_controller")
+
+    client.until(said)
+
+
 def test_stamps_that_stand_still_count_as_silence(client: Client, vehicles: Vehicles) -> None:
     """The controller had sent no more commands, and said nothing in its log; an excitation would never have ended."""
     words = "its stamps do not advance, messages are left out"
