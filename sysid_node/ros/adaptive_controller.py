@@ -180,6 +180,7 @@ class AdaptiveController(LoopNode):
         present, self._wrong = self._wrong, {}
         if self._stamps_stand():
             present[self._imu.topic] = f"{STANDING}: surfaces at level flight's"
+        present |= self._foreign_stamps()
         counts, before = self._state.checks.counts, self._checked
         present |= {f"input {what}": f"{n - before[what]} times" for what, n in counts.items() if n > before[what]}
         self._checked = Counter(counts)
@@ -239,6 +240,17 @@ class AdaptiveController(LoopNode):
         wrong = self._points.receive(time.monotonic(), values)
         if wrong:
             self._wrong[self.inputs[SET_POINTS].name] = "; ".join(wrong)
+
+    def _foreign_stamps(self) -> dict[str, str]:
+        """The topic of the air data with what is wrong with it, where it comes and counts as too old for its stamps."""
+        air = self.inputs[AIR_DATA]
+        if self._imu.silent() or not air.received or air.waited() > SENSOR_AGE:
+            return {}
+        ahead = self._others[AIR_DATA].stamp - self._start_ns / NANOSECONDS - self._now
+        if not abs(ahead) > SENSOR_AGE:
+            return {}
+        words = f"stamped {abs(ahead):.3g} s {'after' if ahead > 0.0 else 'before'} {self._imu.topic}"
+        return {air.name: f"{words}: counts as not measured"}
 
     def _stamps_stand(self) -> bool:
         """Whether the IMU counts as silent although messages come: none is newer than those before it."""

@@ -305,6 +305,24 @@ def test_a_set_point_in_degrees_is_said(client: Client, vehicles: Vehicles) -> N
     client.until(said)
 
 
+def test_air_data_by_another_clock_are_said(client: Client, vehicles: Vehicles) -> None:
+    """They count as not measured, as they must; only that had been said, and not why."""
+    words = "/uav1/air_data: stamped 3.6e+03 s before /uav1/imu/data: counts as not measured"
+    client.flies = False
+
+    def said() -> bool:
+        client.say_imu()
+        client.stamp = client.node.get_clock().now().nanoseconds - 3600 * 10**9
+        client.say_air()
+        client.stamp = 0
+        client.spin(0.02)
+        return words in client.said(CONTROLLER) and words in vehicles.log("adaptive_controller")
+
+    client.until(said)
+    client.flies = True
+    client.until(lambda: "counts as not measured" not in client.said(CONTROLLER))
+
+
 def test_stamps_that_stand_still_count_as_silence(client: Client, vehicles: Vehicles) -> None:
     """The controller had sent no more commands, and said nothing in its log; an excitation would never have ended."""
     words = "its stamps do not advance, messages are left out"
