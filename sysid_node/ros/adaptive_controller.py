@@ -20,6 +20,7 @@ from sysid_node.control.design.plant import CONTROLS
 from sysid_node.control.inputs.estimates import identified_derivatives
 from sysid_node.control.inputs.set_point_input import SetPointInput
 from sysid_node.control.law.allocation import Allocation
+from sysid_node.control.law.reference import set_point_limits
 from sysid_node.control.settings import RANGES, ControllerSettings
 from sysid_node.control.types import Command, Measurements
 from sysid_node.flight.live import messages
@@ -40,6 +41,7 @@ from sysid_node.ros.support.loop_node import (
     LATEST,
     SET_POINT_QOS,
     SET_POINTS,
+    STANDING,
     LoopNode,
     by_name,
     named,
@@ -125,9 +127,12 @@ class AdaptiveController(LoopNode):
 
     def __init__(self) -> None:
         super().__init__("adaptive_controller", PARAMETERS)
-        self._state = controller.init(self.aircraft, ControllerSettings.from_mapping(self.values))
+        settings = ControllerSettings.from_mapping(self.values)
+        self._state = controller.init(self.aircraft, settings)
         self._allocation = Allocation.of(self.aircraft)
-        self._points = SetPointInput(self.values["set_points_expire_after"])
+        self._points = SetPointInput(
+            settings.set_points_expire_after, set_point_limits(self.aircraft.reference.airspeed, settings)
+        )
         self._air: tuple[float, tuple[float, ...]] = (-math.inf, (math.nan,) * 4)  # time, values
         self._extra: tuple[float, list[float]] = (-math.inf, [0.0] * len(CONTROLS))
         self._now, self._imu_count, self._steps_without_imu = math.nan, 0, 0
@@ -164,7 +169,8 @@ class AdaptiveController(LoopNode):
         values |= {f"inputs: {what}": count for what, count in self._state.checks.counts.items()}
         line = "; ".join(f"{axis.axis.name}: {axis.verdict}" for axis in self._state.axes)
         if self._imu.silent() or not self._imu_count:
-            return DiagnosticStatus.ERROR, f"{self._imu.topic} silent: surfaces at level flight's; {line}", values
+            silent = f": {STANDING}" if self._stamps_stand() else " silent"
+            return DiagnosticStatus.ERROR, f"{self._imu.topic}{silent}: surfaces at level flight's; {line}", values
         troubles += [f"{subject}: {text}" for subject, text in self.present.items()]
         line = "; ".join([line, *troubles])
         return DiagnosticStatus.WARN if self._state.stale or troubles else DiagnosticStatus.OK, line, values
@@ -172,6 +178,9 @@ class AdaptiveController(LoopNode):
     def conditions(self) -> Mapping[str, str]:
         """What arrived and was left out or clipped, surfaces at their limits, and a large tracking error."""
         present, self._wrong = self._wrong, {}
+        if self._stamps_stand():
+            present[self._imu.topic] = f"{STANDING}: surfaces at level flight's"
+        present |= self._foreign_stamps()
         counts, before = self._state.checks.counts, self._checked
         present |= {f"input {what}": f"{n - before[what]} times" for what, n in counts.items() if n > before[what]}
         self._checked = Counter(counts)
@@ -231,6 +240,21 @@ class AdaptiveController(LoopNode):
         wrong = self._points.receive(time.monotonic(), values)
         if wrong:
             self._wrong[self.inputs[SET_POINTS].name] = "; ".join(wrong)
+
+    def _foreign_stamps(self) -> dict[str, str]:
+        """The topic of the air data with what is wrong with it, where it comes and counts as too old for its stamps."""
+        air = self.inputs[AIR_DATA]
+        if self._imu.silent() or not air.received or air.waited() > SENSOR_AGE:
+            return {}
+        ahead = self._others[AIR_DATA].stamp - self._start_ns / NANOSECONDS - self._now
+        if not abs(ahead) > SENSOR_AGE:
+            return {}
+        words = f"stamped {abs(ahead):.3g} s {'after' if ahead > 0.0 else 'before'} {self._imu.topic}"
+        return {air.name: f"{words}: counts as not measured"}
+
+    def _stamps_stand(self) -> bool:
+        """Whether the IMU counts as silent although messages come: none is newer than those before it."""
+        return self._imu.silent() and self.inputs[IMU].waited() <= IMU_AGE
 
     def _watch(self) -> None:
         """Without an IMU: no feedback, and the surfaces return to their positions in level flight."""

@@ -27,7 +27,7 @@ from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Text
 from sysid_node.flight.topics import AIR_DATA, IMU
 from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, setting
 from sysid_node.ros.support import conversion
-from sysid_node.ros.support.loop_node import DERIVATIVES, EXCITATION, LATEST, LoopNode, named
+from sysid_node.ros.support.loop_node import DERIVATIVES, EXCITATION, LATEST, STANDING, LoopNode, named
 from sysid_node.ros.support.spin import run_node
 
 _DEFAULT = ExcitationSettings()
@@ -114,7 +114,15 @@ class Exciter(LoopNode):
             "not yet known": " ".join(state.estimates.missing),
             "events": state.happened,
         }
-        return DiagnosticStatus.OK, doing, {**values, "last event": last}
+        line = "; ".join([doing, *(f"{subject}: {text}" for subject, text in self.present.items())])
+        level = DiagnosticStatus.WARN if self.present else DiagnosticStatus.OK
+        return level, line, {**values, "last event": last}
+
+    def conditions(self) -> Mapping[str, str]:
+        """That messages of the IMU are left out because none is newer than those before it."""
+        imu = self.inputs[IMU]
+        stand = imu.received and imu.waited() <= STALE < time.monotonic() - self._inertial[0]
+        return {imu.name: STANDING} if stand else {}
 
     def _on_imu(self, numbers: Numbers, _: Texts) -> None:
         stamp, values, attitude = messages.imu_and_attitude(numbers, self.values["body_frame"])

@@ -13,17 +13,22 @@ from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimates
 
 from sysid_node.faults import watch as watching
+from sysid_node.faults.model.blocks import MOST_GAP
 from sysid_node.faults.model.reference_model import identifier_estimates
 from sysid_node.faults.settings import RANGES, FaultMonitorSettings
 from sysid_node.faults.types import Fault
 from sysid_node.faults.watch import PERIOD, STALE_AFTER, Announcements
+from sysid_node.flight.align import counts_by_reason
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.messages import PATHS, Numbers, Texts
 from sysid_node.flight.live.monitor import Durations
+from sysid_node.flight.live.recent_counts import FEW, RecentCounts
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, setting
 from sysid_node.ros.support import conversion
+from sysid_node.ros.support.diagnostics import rejections
 from sysid_node.ros.support.loop_node import COMMAND, DERIVATIVES, LAG, SENSOR_QOS, LoopNode
+from sysid_node.ros.support.silence import UNHEARD
 from sysid_node.ros.support.spin import run_node
 
 _DEFAULT = FaultMonitorSettings()
@@ -59,6 +64,8 @@ PARAMETERS = (
     ),
 )
 
+UNJUDGED = "faults"  # the subject of what is said where nothing is judged
+
 
 class FaultMonitor(LoopNode):
     """``config/fault_monitor.yaml`` explains its parameters. Raises InputError on wrong ones."""
@@ -67,7 +74,8 @@ class FaultMonitor(LoopNode):
         super().__init__("fault_monitor", PARAMETERS)
         settings = FaultMonitorSettings(**{name: self.values[name] for name in RANGES})
         self._watch = watching.init(self.aircraft, settings, self.values["stale_after"])
-        self._work, self._speech = Durations(), Announcements()
+        self._work, self._speech, self._recent = Durations(), Announcements(), RecentCounts()
+        self._since = time.monotonic()  # s, of the last complete sample, or of the last silence of a topic
         self._faults = self.create_publisher(DiagnosticArray, "~/faults", 10)
         self.listen(Imu, IMU, PATHS[IMU], self._on_imu, SENSOR_QOS)
         self.listen(AirData, AIR_DATA, PATHS[AIR_DATA], self._on_air_data, SENSOR_QOS)
@@ -82,10 +90,25 @@ class FaultMonitor(LoopNode):
         p50, p99 = self._work.percentiles()
         values: dict[str, object] = {"update p50 (us)": 1e6 * p50, "update p99 (us)": 1e6 * p99}
         values |= {"faults": len(faults), "judged for (s)": judged}
+        wrong = [text if subject == UNJUDGED else f"{subject}: {text}" for subject, text in self.present.items()]
         if faults:
-            return DiagnosticStatus.ERROR, "; ".join(fault.text for fault in faults), values
-        learning = judged <= 0.0
-        return DiagnosticStatus.OK, "learns what sound flight is like" if learning else "nothing has failed", values
+            return DiagnosticStatus.ERROR, "; ".join([*(fault.text for fault in faults), *wrong]), values
+        sound = ["learns what sound flight is like" if judged <= 0.0 else "nothing has failed"]
+        line = "; ".join([*([] if UNJUDGED in self.present else sound), *wrong])
+        return DiagnosticStatus.WARN if wrong else DiagnosticStatus.OK, line, values
+
+    def conditions(self) -> Mapping[str, str]:
+        """The rejected messages; and that nothing is judged, where all topics come and no sample is complete."""
+        names = {topic: self.inputs[topic].name for topic in (IMU, AIR_DATA, ACTUATORS)}
+        rejected = counts_by_reason({names[topic]: of for topic, of in self._watch.alignment.rejected.items()})
+        monitors = [self.inputs[topic] for topic in names]
+        recent = self._recent.update(monitors, rejected)
+        wrong = rejections([topic for topic in recent if topic.share > FEW], names, MOST_GAP, parameter="")
+        now = time.monotonic()
+        if any(monitor.waited() > UNHEARD for monitor in monitors):
+            self._since = now
+        late = now - self._since > UNHEARD
+        return ({UNJUDGED: "nothing is judged: no complete sample comes"} if late else {}) | wrong
 
     # Messages
 
@@ -100,8 +123,10 @@ class FaultMonitor(LoopNode):
 
     def _take(self, take: Callable[..., None], *message: Any) -> None:
         """Pass a sensor's message on, and measure how long that takes."""
-        start = time.monotonic()
+        start, before = time.monotonic(), self._watch.stamp_ns
         take(self._watch, start, *message)
+        if self._watch.stamp_ns != before:
+            self._since = start
         self._work.add(time.monotonic() - start)
 
     def _on_command(self, numbers: Numbers, texts: Texts) -> None:

@@ -44,7 +44,7 @@ from sysid_node.ros.support.diagnostics import DiagnosticSource, lag_level, lag_
 from sysid_node.ros.support.lifecycle import CarefulNode
 from sysid_node.ros.support.loop_node import LAST_QOS, SENSOR_QOS, expected_joints, full_name, say, waiting
 from sysid_node.ros.support.message_types import fields_of
-from sysid_node.ros.support.silence import UNHEARD, ClockWatch
+from sysid_node.ros.support.silence import UNHEARD, ClockWatch, joined, several_publishers
 from sysid_node.ros.support.spin import run_node, while_ros_is_up
 
 DIAGNOSTICS = 1.0  # s between diagnostics
@@ -245,7 +245,8 @@ class Identifier(CarefulNode):
         monitors, rejected = list(self._monitors.values()), session.rejected
         recent = self._recent.update(monitors, rejected)
         readings, max_gap = (session.force_fault, session.unchanging), session.settings.max_gap
-        doubt = "; ".join(filter(None, (session.lift_fault, session.interruptions)))
+        doubled = [f"{topic}: {text}" for topic, text in several_publishers(self, self._inputs).items()]
+        doubt = "; ".join(filter(None, (session.lift_fault, session.interruptions, *doubled)))
         message.status.append(source.input(monitors, rejected, stale_after, recent, readings, max_gap, doubt))
         self._warn(session, monitors, recent)
         if not session.samples:
@@ -292,7 +293,7 @@ class Identifier(CarefulNode):
             present["samples"] = session.interruptions
         if session.samples and lag_level(self._lag) != DiagnosticStatus.OK:
             present["estimates"] = lag_words(self._lag)
-        say(self, self._conditions.update(present))
+        say(self, self._conditions.update(joined(present, several_publishers(self, self._inputs))))
 
 
 def main() -> None:

@@ -137,7 +137,10 @@ def _sleep_until(moment: int) -> bool:
 
 
 def _positive(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text}: expected a number over zero")
     return value

@@ -1,14 +1,15 @@
 """The fault monitor over DDS: in the loop with the simulator, from the forces and from the servos' positions."""
 
 import contextlib
+import math
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
-from harness import ended, start
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from harness import JOINTS, Probe, ended, start
 from rcl_interfaces.msg import Log
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import LoggingSeverity
@@ -88,3 +89,23 @@ def test_what_fails_in_the_loop_is_said(heard: tuple[LoopWatch, Listener]) -> No
         until(watch, listener, lambda: listener.faults.get("imu/data", {}).get("kind") == "sensor silent")
         nodes["flight_simulator"].wait()
         nodes["flight_simulator"].returncode = 0
+
+
+def test_messages_that_are_rejected_are_no_sound_flight(probe: Probe) -> None:
+    """It had said that nothing has failed, or that it learns, while each message of the IMU was left out."""
+    said: list[str] = []
+    words = ("nothing is judged: no complete sample comes", "/imu/data: all of", "most as not finite")
+    with ended(start("fault_monitor", "--ros-args", "-p", "aircraft:=cdrw"), said):
+        probe.until(probe.heard)
+
+        def told() -> bool:
+            stamp = time.time_ns()
+            probe.say_imu(stamp, (math.nan,) * 6)
+            probe.say_air_data(stamp, (18.0, 0.05, 0.0, 1.2))
+            probe.say_actuators(stamp, JOINTS, (0.0, 0.0, 0.0, 0.5))
+            status = probe.diagnostics.get("fault_monitor: state")
+            return status is not None and status.level == DiagnosticStatus.WARN and words[0] in status.message
+
+        probe.until(told)
+        assert all(word in probe.diagnostics["fault_monitor: state"].message for word in words)
+    assert all(word in said[0] for word in words)

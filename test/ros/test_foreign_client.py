@@ -294,6 +294,48 @@ def test_a_misspelt_set_point_is_said(client: Client, vehicles: Vehicles) -> Non
     client.until(said)
 
 
+def test_a_set_point_in_degrees_is_said(client: Client, vehicles: Vehicles) -> None:
+    """The limit is flown; nothing had said so."""
+    words = "/uav1/set_points: set-point 'roll' of 20 rad is beyond -0.8 to 0.8 rad: the limit is flown"
+
+    def said() -> bool:
+        client.points.publish(client.joints({"roll": 20.0}))
+        return words in client.said(CONTROLLER) and words in vehicles.log("adaptive_controller")
+
+    client.until(said)
+
+
+def test_air_data_by_another_clock_are_said(client: Client, vehicles: Vehicles) -> None:
+    """They count as not measured, as they must; only that had been said, and not why."""
+    words = "/uav1/air_data: stamped 3.6e+03 s before /uav1/imu/data: counts as not measured"
+    client.flies = False
+
+    def said() -> bool:
+        client.say_imu()
+        client.stamp = client.node.get_clock().now().nanoseconds - 3600 * 10**9
+        client.say_air()
+        client.stamp = 0
+        client.spin(0.02)
+        return words in client.said(CONTROLLER) and words in vehicles.log("adaptive_controller")
+
+    client.until(said)
+    client.flies = True
+    client.until(lambda: "counts as not measured" not in client.said(CONTROLLER))
+
+
+def test_stamps_that_stand_still_count_as_silence(client: Client, vehicles: Vehicles) -> None:
+    """The controller had sent no more commands, and said nothing in its log; an excitation would never have ended."""
+    words = "its stamps do not advance, messages are left out"
+    client.stamp = client.node.get_clock().now().nanoseconds
+    client.until(lambda: f"/uav1/imu/data: {words}: surfaces at level flight's" in client.said(CONTROLLER))
+    client.until(lambda: f"/uav1/imu/data: {words}" in vehicles.log("adaptive_controller"))
+    client.until(lambda: f"/uav3/imu/data: {words}" in client.said("uav3/exciter: state"))
+    client.commands.clear()
+    client.until(lambda: len(client.commands) > 20)
+    client.stamp = 0
+    client.until(lambda: words not in client.said(CONTROLLER))
+
+
 def test_silence_is_said_under_the_resolved_name(client: Client, vehicles: Vehicles) -> None:
     client.flies = False
     client.until(lambda: "/uav1/imu/data silent" in client.said(CONTROLLER))

@@ -168,6 +168,16 @@ def test_an_imu_that_is_interrupted_every_second_is_said(probe: Probe) -> None:
     assert "interruptions of up to 0.3" in said[0]
 
 
+def test_a_second_publisher_of_an_input_is_said(probe: Probe) -> None:
+    second = probe.node.create_publisher(Imu, "imu/data", 10)
+    said: list[str] = []
+    words = "/imu/data: 2 publishers, taken as one"
+    with ended(start_identifier(), said):
+        probe.until(lambda: words in getattr(probe.diagnostics.get("identifier: input"), "message", ""))
+    assert words in said[0]
+    probe.node.destroy_publisher(second)
+
+
 def test_wrong_joints_are_said_with_what_was_expected_and_what_came(probe: Probe) -> None:
     """In a namespace: its names carry it, on /diagnostics and in the log."""
     process = start_identifier(namespace="/uav1")

@@ -85,6 +85,7 @@ def test_restamped_all_stamps_move_by_one_constant_to_now(probe: Probe, bag: Pat
     [
         (["nowhere"], "bag nowhere: does not exist in "),
         (["--rate", "0", "nowhere"], "expected a number over zero"),
+        (["--rate", "fast", "nowhere"], "argument --rate: fast: expected a number over zero"),
         ([str(ROOT / "bags" / "cdrw_random"), "--wait-for", "/imu"], "--wait-for /imu: not in "),
     ],
 )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeVar
 
@@ -72,17 +73,25 @@ class DelayedReference:
 
 def limited(points: SetPoints, level: float, speed: float, settings: ControllerSettings) -> SetPoints:
     """The set-points within their limits; ``level`` pitch (rad) and reference ``speed`` (m/s) replace NaN."""
-
-    def within(value: float, otherwise: float, most: float) -> float:
-        return otherwise if math.isnan(value) else min(max(value, -most), most)
-
+    usual = SetPoints(roll=0.0, pitch=level, sideslip=0.0, airspeed=speed, pitch_rate=math.nan)
+    limits = set_point_limits(speed, settings)
     return SetPoints(
-        within(points.roll, 0.0, settings.largest_roll),
-        within(points.pitch, level, settings.largest_pitch),
-        within(points.sideslip, 0.0, settings.largest_sideslip),
-        speed if math.isnan(points.airspeed) else min(max(points.airspeed, 0.75 * speed), 1.4 * speed),
-        within(points.pitch_rate, math.nan, MOST_RATE),
+        *(
+            otherwise if math.isnan(value) else min(max(value, lower), upper)
+            for value, otherwise, (lower, upper) in zip(points, usual, limits.values(), strict=True)
+        )
     )
+
+
+def set_point_limits(speed: float, settings: ControllerSettings) -> Mapping[str, tuple[float, float]]:
+    """Least and largest value of each set-point (rad, m/s, rad/s), in their order; ``speed`` (m/s) is the reference."""
+    return {
+        "roll": (-settings.largest_roll, settings.largest_roll),
+        "pitch": (-settings.largest_pitch, settings.largest_pitch),
+        "sideslip": (-settings.largest_sideslip, settings.largest_sideslip),
+        "airspeed": (0.75 * speed, 1.4 * speed),
+        "pitch_rate": (-MOST_RATE, MOST_RATE),
+    }
 
 
 def advance(state: ReferenceState, points: SetPoints, step: float, flight: FlightCondition) -> ReferenceMotion:

@@ -48,7 +48,7 @@ class Arrivals:
     topic: str
     silent_after: float
     clock: Callable[[], float] = time.monotonic  # s
-    last_arrival: float = -math.inf  # s, by ``clock``, of the last message
+    last_arrival: float = -math.inf  # s, by ``clock``, of the last message that was newer than those before it
     stamp: float = math.nan  # s, the newest
     start: tuple[float, float] = (math.nan, math.nan)  # s, ``clock`` and stamp when the stamps began, or were set
     intervals: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT))  # s between stamps
@@ -59,15 +59,15 @@ class Arrivals:
     count: int = 0  # of all problems so far
 
     def arrived(self, stamp: float) -> bool:
-        """Take a message with a stamp (s). False where it is not newer than the messages before it."""
+        """Take a message with a stamp (s). False where it is not newer than those before it: it ends no silence."""
         now = self.clock()
-        if self.silent():
-            self._add(f"was silent for {now - self.last_arrival:.1f} s")
         step, expected = stamp - self.stamp, self._expected_step(now)
-        self.last_arrival = now
         if -STEP_BACK < step <= 0.0:
             self._add("out of order")
             return False
+        if self.silent():
+            self._add(f"was silent for {now - self.last_arrival:.1f} s")
+        self.last_arrival = now
         if math.isnan(self.start[0]):
             self.start = now, stamp
         if step <= -STEP_BACK or step - expected > STEP_AHEAD:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 NANOSECONDS = 1_000_000_000
@@ -16,12 +17,12 @@ class FlightTime:
     _stamp: int | None = None  # ns, the newest
 
     def arrived(self, stamp_ns: int) -> bool:
-        """Take the stamp of a message. False where the message is older than the one before it.
+        """Take the stamp of a message. False where the message is not newer than the one before it.
 
         A step of the stamps by more than ``LONGEST_STEP``, to either side, adds nothing.
         """
-        step = 0.0 if self._stamp is None else (stamp_ns - self._stamp) / NANOSECONDS
-        if -LONGEST_STEP <= step < 0.0:
+        step = math.inf if self._stamp is None else (stamp_ns - self._stamp) / NANOSECONDS
+        if -LONGEST_STEP <= step <= 0.0:
             return False
         self._stamp = stamp_ns
         self.seconds += step if 0.0 < step <= LONGEST_STEP else 0.0

@@ -48,7 +48,7 @@ def model_gap(state: EstimatorState, current: CurrentSolution | None) -> list[Co
     deviations = np.where(structure.belongs > 0.0, np.abs(theta - values) / np.maximum(spread, 1e-300), -1.0)
     worst = deviations.argmax(axis=0).tolist()
     names = [f"{c}_{structure.regressors[i]}" for c, i in zip(structure.coefficients, worst, strict=True)]
-    noise = np.sqrt(2.0 * (stop - start) * latest.uncertainty.density)
+    noise = latest.uncertainty.residual_std(stop - start)
     stds = (column.tolist() for column in (np.sqrt(per_energy * energy), noise, relative))
     return list(map(CoefficientGap, structure.coefficients, *stds, names, deviations.max(axis=0).tolist()))
 

@@ -52,7 +52,7 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
     caution, longest = np.maximum(cautions, 1.0), latest.instruments.anderson_rubin.longest(squares)
     systematic = _systematic(state, latest)
     without_objection = objections == status.OK
-    stds, samples = np.sqrt(2.0 * (stop - start) * latest.uncertainty.density), round(latest.total.samples)
+    stds, samples = latest.uncertainty.residual_std(stop - start), round(latest.total.samples)
     return ValidityBasis(
         without_objection=(strength >= normal_equations.STRONG)[c] & without_objection,
         objections=objections,

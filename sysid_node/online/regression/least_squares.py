@@ -106,6 +106,14 @@ class Uncertainty:
     bands: Array  # (C, B) of the residual in each band
     freedom: Array  # (C,) degrees of freedom
 
+    def residual_std(self, band: float) -> Array:
+        """(C,) standard deviation of the residuals within a ``band`` (Hz); NaN where rounding makes a density negative.
+
+        That happens in the first few samples, of which nothing is valid.
+        """
+        std: Array = np.sqrt(np.where(self.density < 0.0, np.nan, 2.0 * band * self.density))
+        return std
+
 
 def uncertainty(equations: NormalEquations, solution: Solution, info: Information) -> Uncertainty:
     """Sandwich covariance with the residual's density estimated in each band, and with noise that comes and goes."""

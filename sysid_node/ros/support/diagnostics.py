@@ -131,10 +131,13 @@ def lag_words(lag: float) -> str:
     return f"{1e3 * lag:.1f} ms after its sample" if lag > -LATE else f"{-lag:.1f} s before the stamp of its sample"
 
 
-def rejections(recent: Sequence[RecentTopic], resolved: Mapping[str, str], max_gap: float = 0.0) -> dict[str, str]:
+def rejections(
+    recent: Sequence[RecentTopic], resolved: Mapping[str, str], max_gap: float = 0.0, parameter: str = " (max_gap)"
+) -> dict[str, str]:
     """What was rejected of each topic lately, by its resolved name, and what to do where that is for gaps in another.
 
-    ``max_gap`` (s) is the longest gap that is interpolated across; 0 where nothing is.
+    ``max_gap`` (s) is the longest gap that is interpolated across; 0 where nothing is. ``parameter`` names the
+    parameter that sets it; it is empty where none does.
     """
     words = {}
     for topic in recent:
@@ -142,14 +145,14 @@ def rejections(recent: Sequence[RecentTopic], resolved: Mapping[str, str], max_g
             count = sum(topic.rejected.values())
             words[resolved.get(topic.topic, topic.topic)] = (
                 f"{'all' if topic.share >= ALL else count} of {topic.received} messages rejected, most as {topic.most}"
-                + _remedy(topic.most, resolved, max_gap)
+                + _remedy(topic.most, resolved, max_gap, parameter)
             )
     return words
 
 
-def _remedy(reason: str, resolved: Mapping[str, str], max_gap: float) -> str:
+def _remedy(reason: str, resolved: Mapping[str, str], max_gap: float, parameter: str) -> str:
     """What to do where messages are left out for gaps in another topic; empty where they are for something else."""
     other = next((name for topic, name in resolved.items() if reason == gap(topic)), "")
     if not other or not max_gap:
         return ""
-    return f": {other} must come at least every {max_gap:g} s (max_gap), stamped by the same clock"
+    return f": {other} must come at least every {max_gap:g} s{parameter}, stamped by the same clock"

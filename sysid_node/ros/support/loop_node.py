@@ -27,7 +27,7 @@ from sysid_node.ros.support import conversion
 from sysid_node.ros.support.aircraft import aircraft_of
 from sysid_node.ros.support.declaring import declare, values_of
 from sysid_node.ros.support.message_types import fields_of
-from sysid_node.ros.support.silence import UNHEARD, ClockWatch, why_silent
+from sysid_node.ros.support.silence import UNHEARD, ClockWatch, joined, several_publishers, why_silent
 from sysid_node.ros.support.spin import while_ros_is_up
 
 COMMAND = "actuators/command"
@@ -50,6 +50,8 @@ LAST_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 #: The parameter of the nodes that model the surfaces.
 LAG = ("actuator_lag", "s", "First-order lag of the surfaces behind their commands.", "For every aircraft.")
+#: What is said of a topic whose messages are left out for their stamps.
+STANDING = "its stamps do not advance, messages are left out"
 EFFECT = "They take effect when the node starts; effects of the flight_simulator at any time."
 
 
@@ -166,11 +168,13 @@ class LoopNode(Node, ABC):
         self._left_out.clear()
         foreign = self._foreign_estimates()
         self.present = {**self.conditions(), **foreign}
-        say(self, self._conditions.update({**silent, **left_out, **self.present}))
+        doubled = several_publishers(self, self._needed.values())
+        say(self, self._conditions.update(joined({**silent, **left_out, **self.present}, doubled)))
         for line in self._states.update(self.states()):
             self.get_logger().warning(line)
         level, line, values = self.words()
         missing = [f"{name}: {text}" for name, text in {**silent, **left_out, **foreign}.items() if name not in line]
+        missing += [f"{name}: {text}" for name, text in doubled.items()]
         pairs = [KeyValue(key=k, value=f"{v:.6g}" if isinstance(v, float) else str(v)) for k, v in values.items()]
         status = DiagnosticStatus(
             level=max(level, DiagnosticStatus.WARN) if missing else level,

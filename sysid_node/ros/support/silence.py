@@ -1,8 +1,12 @@
-"""Why a topic is silent, as far as the graph of ROS tells: nobody publishes it, or not as this node listens to it."""
+"""What the graph of ROS tells of a node's topics: why one is silent, and which have several publishers.
+
+A topic is silent where nobody publishes it, or not as this node listens to it.
+"""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rclpy.node import Node
@@ -29,6 +33,19 @@ def why_silent(node: Node, subscription: Any) -> str:
     if all(compatible == QoSCompatibility.ERROR for compatible, _ in checks):
         return ": its publisher's quality of service is not what this node asks for (see qos_overrides)"
     return ""
+
+
+def several_publishers(node: Node, subscriptions: Iterable[Any]) -> dict[str, str]:
+    """By topic, that it has several publishers, of the topics of the ``subscriptions`` that have."""
+    counts = {one.topic_name: node.count_publishers(one.topic_name) for one in subscriptions}
+    words = "publishers, taken as one: stop all but one, or remap their topics"
+    return {topic: f"{count} {words}" for topic, count in counts.items() if count > 1}
+
+
+def joined(first: Mapping[str, str], second: Mapping[str, str]) -> dict[str, str]:
+    """By topic, what either says of it, or both."""
+    both = {topic: f"{first[topic]}; {text}" if topic in first else text for topic, text in second.items()}
+    return {**first, **both}
 
 
 class ClockWatch:

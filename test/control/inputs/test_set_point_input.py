@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from sysid_node.control import controller
 from sysid_node.control.inputs.set_point_input import SetPointInput
+from sysid_node.control.law.reference import set_point_limits
 from sysid_node.control.settings import ControllerSettings
 from sysid_node.control.types import SetPoints
 
@@ -71,3 +72,12 @@ def test_whatever_is_asked_for_the_reference_keeps_its_limits(points: list[SetPo
         assert abs(wanted.theta) <= 0.4 + 1e-9
         assert abs(wanted.phi) <= 0.8 + 1e-9
         assert abs(wanted.beta) <= 0.15 + 1e-9
+
+
+def test_what_is_beyond_its_limits_is_said() -> None:
+    given = SetPointInput(2.0, set_point_limits(20.0, ControllerSettings()))
+    assert given.receive(0.0, {"roll": 0.8, "pitch": -0.4, "airspeed": 28.0, "pitch_rate": float("nan")}) == []
+    assert given.receive(0.0, {"roll": -20.0, "airspeed": 40.0}) == [
+        "set-point 'roll' of -20 rad is beyond -0.8 to 0.8 rad: the limit is flown",
+        "set-point 'airspeed' of 40 m/s is beyond 15 to 28 m/s: the limit is flown",
+    ]

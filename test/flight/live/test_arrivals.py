@@ -102,6 +102,20 @@ def test_a_clock_that_steps_back(clock: Clock) -> None:
     assert topic.count == 2
 
 
+def test_messages_whose_stamps_stand_still_end_no_silence(clock: Clock) -> None:
+    """They had counted as heard: nothing was done with them, nor was the topic silent."""
+    topic = Arrivals("imu/data", 0.1, clock)
+    fed(clock, topic, 1.0)
+    newest = topic.stamp
+    for _ in range(20):
+        clock.now += 0.01
+        assert not topic.arrived(newest)
+    assert topic.silent()
+    assert topic.troubles() == ["imu/data out of order", "imu/data silent for 0.2 s"]
+    assert topic.arrived(newest + 0.21)
+    assert topic.troubles() == ["imu/data was silent for 0.2 s"]
+
+
 @pytest.mark.parametrize("pace", [1.0, 10.0])
 def test_a_silence_is_no_clock_that_was_set(clock: Clock, pace: float) -> None:
     """The sender goes on after 8 s, its stamps as far ahead as its clock has run; a simulation's may run faster."""

@@ -30,6 +30,7 @@ def test_an_older_message_is_left_out() -> None:
         (5 * SECOND, True),
         (5 * SECOND + 20, True),
         (5 * SECOND + 10, False),
+        (5 * SECOND + 20, False),
         (5 * SECOND + 30, True),
     ):
         assert time.arrived(stamp) == newer

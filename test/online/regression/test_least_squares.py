@@ -1,6 +1,7 @@
 """Solutions and covariances against numpy.linalg.lstsq and textbook formulas."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -238,3 +239,12 @@ def test_a_rival_is_the_regressor_that_moved_alike() -> None:
     lines[:, q] = lines[:, de] + 0.05 * lines[:, alpha] + 0.01 * np.random.default_rng(1).normal(size=ROWS)
     names = least_squares.most_correlated(PLAIN, least_squares.solve(PLAIN, lines.T @ lines))
     assert [PLAIN.structure.regressors[names[i]] for i in PLAIN.structure.unknowns(0)][1:] == ["de", "q"]
+
+
+def test_a_density_that_is_rounding_has_no_standard_deviation() -> None:
+    """Of the first samples after long gaps, where NumPy's warning had come onto the terminal of the node."""
+    covariance, bands, freedom = np.zeros((2, 1, 1)), np.zeros((2, BANDS)), np.zeros(2)
+    rounding = least_squares.Uncertainty(covariance, np.array([4.0, -1e-21]), bands, freedom)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert rounding.residual_std(0.5) == pytest.approx([2.0, math.nan], nan_ok=True)

@@ -11,7 +11,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 
-from sysid_node.ros.support.silence import UNHEARD, ClockWatch, why_silent
+from sysid_node.ros.support.silence import UNHEARD, ClockWatch, joined, several_publishers, why_silent
 
 BEST_EFFORT = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 RELIABLE = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE)
@@ -76,3 +76,20 @@ def test_a_clock_that_does_not_come(ros: None, probe: Probe, simulated: bool) ->
     probe.spin(UNHEARD + 0.1)
     assert watch.missing() == ({"/clock": "no message yet, and use_sim_time is true"} if simulated else {})
     one.destroy_node()
+
+
+def test_a_topic_with_two_publishers_is_said(node: Node, probe: Probe) -> None:
+    """Their messages are mixed in order of stamps: estimates had become valid, and nothing had said so."""
+    subscriptions = [node.create_subscription(Imu, topic, ignored, BEST_EFFORT) for topic in ("two/imu", "one/imu")]
+    publishers = [node.create_publisher(Imu, topic, 1) for topic in ("two/imu", "two/imu", "one/imu")]
+    assert len(publishers) == 3
+    words = {"/two/imu": "2 publishers, taken as one: stop all but one, or remap their topics"}
+    probe.until(lambda: several_publishers(node, subscriptions) == words)
+
+
+def test_what_is_said_of_one_topic_twice_is_one_line() -> None:
+    assert joined({"/a": "late", "/b": "silent"}, {"/a": "doubled", "/c": "doubled"}) == {
+        "/a": "late; doubled",
+        "/b": "silent",
+        "/c": "doubled",
+    }
