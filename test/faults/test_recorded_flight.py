@@ -148,3 +148,18 @@ def test_a_jump_of_the_recorders_clock_from_1970_to_today_takes_no_time(flight: 
 
     jumping = Streams(set_clock(some.imu), set_clock(some.air_data), set_clock(some.actuators), some.name)
     assert judge(AIRCRAFT, FaultMonitorSettings(), jumping).judged < 10.0
+
+
+def test_readings_that_never_change_are_judged_without_a_failure(flight: Streams) -> None:
+    """Residuals without any noise have a variance of zero, by which nothing may be divided."""
+    imu, air, joints = flight.imu, flight.air_data, flight.actuators
+    still = [np.broadcast_to(values[0], values.shape) for values in (imu.values, air.values, joints.positions)]
+    dead = Streams(
+        dataclasses.replace(imu, values=still[0], attitude=np.broadcast_to(imu.attitude[0], imu.attitude.shape)),
+        dataclasses.replace(air, values=still[1]),
+        dataclasses.replace(joints, positions=still[2]),
+    )
+    with np.errstate(divide="raise", invalid="raise"):
+        verdict = judge(AIRCRAFT, FaultMonitorSettings(), dead)
+    assert verdict.judged > 20.0
+    assert not verdict.episodes

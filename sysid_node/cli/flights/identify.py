@@ -36,6 +36,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> None:
     """Identifies from the flights and writes the results."""
+    options.refuse_twice([*args.bag, *args.holdout])
     flights, holdout = (
         [load(path, args.aircraft, topics=args.topic, body_frame=args.body_frame) for path in paths]
         for paths in (args.bag, args.holdout)

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 ORDER = 2
 _RIDGE = 1e-3
 _LEAST = 1e-16  # added to the variances, so that none is zero
+_LEAST_NOISE = 1e-12  # variance of a coefficient that counts at least; far below any flight's, with digits to spare
 GROUPS = ((0, 1, 4), (2, 3, 5))  # longitudinal, lateral coefficients
 
 
@@ -64,6 +65,7 @@ def settle(whitening: WhiteningFilter) -> None:
     det = r0 * r0 - r1 * r1
     whitening.filter = np.array([(r0 * r1 - r1 * r2) / det, (r0 * r2 - r1 * r1) / det])
     covariance = whitening.innovations / max(whitening.weight, 1.0) + _LEAST * np.eye(6)
+    covariance += np.diag(np.maximum(_LEAST_NOISE - np.diag(covariance), 0.0))
     whitening.unmix = np.zeros((6, 6))
     for group in GROUPS:
         block = np.ix_(group, group)
@@ -79,5 +81,5 @@ def _cholesky(covariance: Array) -> Array:
 
 
 def scale(whitening: WhiteningFilter) -> Array:
-    """(6,) standard deviation of the innovations."""
-    return np.asarray(np.sqrt(np.diag(whitening.innovations) / max(whitening.weight, 1.0)))
+    """(6,) standard deviation of the innovations; not zero, not even where no residual has ever changed."""
+    return np.asarray(np.sqrt(np.maximum(np.diag(whitening.innovations) / max(whitening.weight, 1.0), _LEAST_NOISE)))

@@ -162,6 +162,18 @@ def test_bad_input_is_one_line(tmp_path, capsys, change, said):
     assert error.count("\n") == 1
 
 
+@pytest.mark.parametrize("again", [[], ["--holdout"]], ids=["fitted", "held out"])
+def test_a_flight_given_twice_is_refused(tmp_path, capsys, again):
+    """Fitted twice it would make the intervals too narrow; held out it would check nothing."""
+    flight = str(BAGS / "cdrw_multistep")
+    fitted = ["identify", flight, *again, flight, "--aircraft", "cdrw", "--method", "equation_error"]
+    assert main([*fitted, "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "given twice" in error
+    assert not (tmp_path / "out").exists()
+
+
 def test_an_unknown_method_names_the_known_ones(tmp_path, capsys):
     with pytest.raises(SystemExit) as stopped:
         main(arguments(tmp_path / "out", method="kalman"))
