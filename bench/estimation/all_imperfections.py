@@ -1,7 +1,7 @@
 """Coverage of the intervals where everything is a little off at once.
 
     python -m bench.estimation.all_imperfections RESULTS.jsonl [--flights 60] [--first 1] [--replay | --others]
-        [--page FILE]
+        [--actuators auto] [--page FILE]
 
 Each flight is that of `sysid simulate --aircraft cdrw --manoeuvre 3211:repeat=3`, with imperfections drawn as aircraft
 have them: servos of first order (20 to 120 ms) or second (3 to 12 Hz), rate limits of 2 to 6 rad/s, delays up to 40 ms,
@@ -9,7 +9,7 @@ late gyroscopes and air data, and every tolerance of the aircraft file at its si
 alone. Of the servos the aircraft file is right, wrong by its tolerances, or silent. A flight's number is the seed of
 all that is drawn, so that results can be continued; they are appended line by line. `--page` makes the tables,
 `--replay` those of the online estimator alone, and `--others` that of the online estimator on other aircraft and by
-multisine, so many flights of each.
+multisine, so many flights of each. `--actuators commands` tells the online estimator what is recorded.
 """
 
 from __future__ import annotations
@@ -132,6 +132,7 @@ def flown(
     number: int,
     methods: Sequence[str] = METHODS,
     manoeuvre: str = MANOEUVRE,
+    carried: str = "auto",
 ) -> dict[str, Any]:
     """One line of the results: of each method the rows of derivatives and servos, and how many were valid without."""
     kind, effects = drawn(aircraft, number)
@@ -144,7 +145,7 @@ def flown(
         for name in aircraft.controls
     }
     for method in methods:
-        derivatives, servos = estimated(method, file, streams, "auto")
+        derivatives, servos = estimated(method, file, streams, carried)
         line[method] = {name: _row(d, truth[name]) for name, d in derivatives.items()}
         line[f"{method}_servos"] = {name: _row(d, late[name]) for name, d in servos.items()}
     exact = FlightSampler(actuator_rate=200.0, surfaces="measured").record(
@@ -210,22 +211,23 @@ def tables(lines: list[dict[str, Any]], methods: Sequence[str] = METHODS) -> str
     return f"{table(heads, body)}\n\n{table(second, each)}"
 
 
-def others(path: Path, first: int, flights: int) -> str:
+def others(path: Path, first: int, flights: int, carried: str) -> str:
     """The table of so many flights of each of the others, from the first number on, no number twice.
 
-    Those that are missing in a file of results are flown.
+    Those that are missing in a file of results are flown, and what their actuators topic is said to carry is kept.
     """
-    lines, rows = _read(path), []
+    kept, rows = _read(path), []
+    lines = {(line["aircraft"], line["manoeuvre"], line["carried"], line["number"]): line for line in kept}
     for place, (name, manoeuvre) in enumerate(OTHERS):
-        numbers = range(first + place * flights, first + (place + 1) * flights)
+        keys = [(name, manoeuvre, carried, first + place * flights + k) for k in range(flights)]
         aircraft = load_aircraft(name)
         simulator = Simulator(aircraft, RATE)
-        which = {"aircraft": name, "manoeuvre": manoeuvre}
-        for number in numbers:
-            if not any({**line, **which, "number": number} == line for line in lines):
-                lines.append({**which, **flown(simulator, aircraft, number, METHODS[:1], manoeuvre)})
-                _append(path, lines[-1])
-        some = [line for line in lines if {**line, **which} == line and line["number"] in numbers]
+        for key in keys:
+            if key not in lines:
+                line = flown(simulator, aircraft, key[-1], METHODS[:1], manoeuvre, carried)
+                lines[key] = {"aircraft": name, "manoeuvre": manoeuvre, "carried": carried, **line}
+                _append(path, lines[key])
+        some = [lines[key] for key in keys]
         exact = f"{np.mean([line['valid_exact'] for line in some]):.1f}"
         words = f"`{name}`, {manoeuvre.split(':')[0].replace('3211', '3-2-1-1')}"
         rows.append([words, str(len(some)), exact, *counted(some, "replay"), *counted(some, "replay_servos")])
@@ -253,19 +255,19 @@ def main() -> None:
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--replay", action="store_true", help="the online estimator alone")
     which.add_argument("--others", action="store_true", help="other aircraft and manoeuvres")
+    parser.add_argument("--actuators", choices=("auto", "commands"), default="auto", help="what they are said to carry")
     args = parser.parse_args()
     numbers = range(args.first, args.first + args.flights)
     if args.others:
-        publish(
-            "bench/estimation/all_imperfections.py others", others(args.results, args.first, args.flights), args.page
-        )
+        found = others(args.results, args.first, args.flights, args.actuators)
+        publish("bench/estimation/all_imperfections.py others", found, args.page)
         return
     lines, methods = _read(args.results), METHODS[:1] if args.replay else METHODS
     aircraft = load_aircraft("cdrw")
     simulator = Simulator(aircraft, RATE)
     for number in numbers:
         if all(line["number"] != number for line in lines):
-            lines.append(flown(simulator, aircraft, number, methods))
+            lines.append(flown(simulator, aircraft, number, methods, carried=args.actuators))
             _append(args.results, lines[-1])
     section = f"bench/estimation/all_imperfections.py{' replay' if args.replay else ''}"
     publish(section, tables(lines, methods), args.page)
