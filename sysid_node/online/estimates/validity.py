@@ -13,6 +13,7 @@ from sysid_node.online import status
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.estimates.current_solution import CurrentSolution
 from sysid_node.online.regression import least_squares, normal_equations
+from sysid_node.online.regression.gust_correlation import MOMENTS
 from sysid_node.online.regression.least_squares import student_95
 from sysid_node.online.state import EstimatorState, SegmentSolution, ValidityBasis
 from sysid_node.online.status import Codes
@@ -104,6 +105,8 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     biased = lag.biased[table.unknown, c] & ~table.offset
     objections[biased] = [words.code(f"{lag.lagging_control[i]} not on time") for i in c[biased].tolist()]
     solved = state.equations.structure
+    for symbol, axis in _felt_at_another_time(state, latest):
+        objections[axis[c]] = words.code(f"{symbol} not on time")
     for symbol in _ahead_of_commands(state, latest):
         of_it = solved.belongs[np.array(solved.regressors) == symbol].any(axis=0)
         objections[np.asarray(of_it)[c] & ~table.offset] = words.code(f"{symbol} not on time")
@@ -118,6 +121,22 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     objections[latest.tests.contradicted[c]] = status.CONTRADICTED
     objections[latest.tests.outside_model[c]] = status.OUTSIDE
     return objections
+
+
+def _felt_at_another_time(state: EstimatorState, latest: SegmentSolution) -> list[tuple[str, Flags]]:
+    """Controls of whose time all derivatives of a moment depend, and the coefficients (C,) that they are wrong for.
+
+    When a deflection is felt is a property of the control, and the moment tells it best. Lift and drag, or the side
+    force, have the same regressors and instruments; that their own equations do not show it makes them no better. A
+    surface that only answers gusts is felt before it moves, for the gust that it answers is what is felt.
+    """
+    structure, lag = state.equations.structure, latest.tests.lag
+    found, belongs = [], structure.belongs > 0.0
+    for i, symbol in lag.lagging_control.items():
+        if structure.coefficients[i] in MOMENTS and lag.biased[belongs[:, i], i].all():
+            of_it = belongs[np.array(structure.regressors) == symbol].any(axis=0)
+            found.append((symbol, np.asarray(of_it & (structure.block == structure.block[i]))))
+    return found
 
 
 def _ahead_of_commands(state: EstimatorState, latest: SegmentSolution) -> tuple[str, ...]:
