@@ -30,6 +30,7 @@ WORDS = (
     "flow angle not measured",
     "gusts hide alpha",
     "gusts hide beta",
+    "surfaces answer gusts",
 )
 OK, CONVERGING, OUTSIDE, NOT_EXCITED, CONTRADICTED, CHANGED, STALE, THRUST, INERTIA = range(9)
 

@@ -110,6 +110,7 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     for symbol in _ahead_of_commands(state, latest):
         of_it = solved.belongs[np.array(solved.regressors) == symbol].any(axis=0)
         objections[np.asarray(of_it)[c] & ~table.offset] = words.code(f"{symbol} not on time")
+    objections[latest.instruments.answer_gusts[c]] = words.code("surfaces answer gusts")
     objections[(latest.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = status.CONVERGING
     if not state.inputs.thrust_known:
         objections[table.needs_thrust] = status.THRUST

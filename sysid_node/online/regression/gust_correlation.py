@@ -12,6 +12,11 @@ share of gusts in the deflections grows with the energy of the gusts' moments ov
 (Ljung, "System Identification", 2nd ed. (1999), sect. 13.4, of feedback without excitation). So rho is taken as
 ``ANSWERED`` times the root of that ratio, and as ``ALLOWED`` at least. All coefficients with the same regressors have
 the same instruments, and so the largest ratio among their moments.
+
+Where the surfaces do nothing but answer gusts, all of this is too little. What the surfaces do then is opposed to what
+the gusts do: of the measured rate x = z + g, with the instrument z and the gusts' part g, a feedback of loop gain L
+makes z = -L g / (1 + L), and the slope of x on z is -1 / L. A flight in which the surfaces are moved on purpose has a
+slope of about 1, whatever the gusts are; errors of the file by a third change it by about as much.
 """
 
 from __future__ import annotations
@@ -32,6 +37,11 @@ Array = NDArray[np.float64]
 ALLOWED = 0.05  # correlation between instruments and gusts, where surfaces are moved on purpose
 ANSWERED = 0.15  # that correlation where the gusts' moments have the energy of the moments by deflections
 MOMENTS = ("Cl", "Cm", "Cn")
+RATES = ("p", "q", "r")
+#: Slope of a rate on its instrument under which the surfaces answer gusts, unless the rate follows the instrument: the
+#: second is the correlation from which on it does. A surface with the wrong sign in the file has the slope -1.
+OPPOSED, FOLLOWED = 0.1, 0.75
+NOTABLE = 0.1  # share of gusts in the residuals of an axis from which on it matters that surfaces answer them
 #: By coefficient those whose residuals tell of gusts in its regressors, which are the same for a whole axis. What is
 #: left of the drag counts for the drag alone: most of it is of a polar that no derivative describes.
 TELLING = {"CL": ("CL", "Cm"), "CD": ("CL", "CD", "Cm"), "Cm": ("CL", "Cm")}
@@ -61,6 +71,23 @@ def of_solution(equations: NormalEquations, solution: Solution, gram: Array, gus
     """
     columns = equations.columns
     return by_deflections(equations, solution.theta, gram[columns[:, None], columns], gusts * solution.residual)
+
+
+def only_answered(instrumented: NormalEquations, gram: Array, gusts: Array) -> NDArray[np.bool_]:
+    """(C,) coefficients of an axis whose surfaces do nothing but answer gusts, by the ``gram`` (W, W).
+
+    ``instrumented``: the equations with the instruments of all regressors that have one; ``gusts`` (C,): see
+    ``share_of_gusts``.
+    """
+    structure, found = instrumented.structure, np.zeros(instrumented.structure.block.size, dtype=bool)
+    for i, regressor in enumerate(structure.regressors):
+        x, z = instrumented.columns[i], instrumented.instruments[i]
+        if regressor not in RATES or x == z or gram[z, z] <= 0.0 or gram[x, x] <= 0.0:
+            continue
+        correlation = abs(gram[z, x]) / math.sqrt(gram[z, z] * gram[x, x])
+        if gram[z, x] < OPPOSED * gram[z, z] and correlation < FOLLOWED:
+            found |= structure.block == structure.group[i]
+    return np.asarray(found & (share_by_axis(structure.coefficients, gusts) > NOTABLE))
 
 
 def by_deflections(equations: NormalEquations, theta: Array, normal: Array, energy: Array) -> Array:

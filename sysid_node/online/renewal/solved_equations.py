@@ -111,6 +111,7 @@ def _instrument_checks(
         strength,
         selection_bias_factors(equations, solution, spread, strength, gram, *state.model.prior),
         weak_instruments.anderson_rubin_bounds(equations, table, solution, gram, spread, noise_alone, mean, gusts),
+        gust_correlation.only_answered(state.model.instrumented, gram, gusts),
     )
 
 

@@ -1,5 +1,6 @@
 """What an estimate is called. Truth: the derivatives that the flight was simulated with."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -43,3 +44,32 @@ def test_what_is_valid_is_near_the_truth() -> None:
         assert len(valid) >= (12 if late else 20)
         for name, d in valid.items():
             assert abs(d.value - TRUTH[name]) < 4.0 * d.standard_error, name
+
+
+@cache
+def in_gusts(moved: bool, stated_noise: float) -> Estimates:
+    """Of a flight in gusts under an autopilot; the file states so many times the sensors' noise."""
+    commands = multisteps(SECONDS, RATE) if moved else np.zeros((int(SECONDS * RATE), 3))
+    time, (samples,) = fly(EXACT, commands, RATE, gusts=1.5)
+    known = replace(EXACT, noise={name: stated_noise * sigma for name, sigma in EXACT.noise.items()})
+    settings = OnlineSettings(method="sls_rft", actuators="positions", detect_changes=False)
+    state = estimator.init(known, settings)
+    for at, sample in zip(time.tolist(), samples.tolist(), strict=True):
+        estimator.update(state, at, sample)
+    return estimate(state)
+
+
+def test_surfaces_that_do_nothing_but_answer_gusts_tell_nothing_where_more_than_sensor_noise_is_left() -> None:
+    found = in_gusts(moved=False, stated_noise=0.3).derivatives
+    assert {d.status for d in found.values()} == {"surfaces answer gusts"}
+
+
+def test_surfaces_that_are_moved_on_purpose_as_well_tell_the_derivatives() -> None:
+    found = in_gusts(moved=True, stated_noise=0.3).derivatives
+    assert "surfaces answer gusts" not in {d.status for d in found.values()}
+    assert all(found[name].valid for name in ("CL_alpha", "Cm_alpha", "Cm_de", "Cl_p", "Cn_dr"))
+
+
+def test_answers_to_gusts_that_vanes_measure_do_no_harm() -> None:
+    found = in_gusts(moved=False, stated_noise=1.0).derivatives
+    assert all(found[name].valid for name in ("CL_alpha", "Cm_alpha", "Cm_de"))

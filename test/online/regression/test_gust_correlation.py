@@ -102,3 +102,37 @@ def test_a_residual_tells_of_the_gusts_in_the_regressors_of_its_axis() -> None:
     """The drag's for the drag alone, lift's and pitching moment's for all three."""
     found = gust_correlation.share_by_axis(["CL", "CD", "Cm", "CY", "Cl"], np.array([0.1, 0.9, 0.3, 0.0, 0.6]))
     np.testing.assert_allclose(found, [0.3, 0.9, 0.3, 0.6, 0.6])
+
+
+def answered(rate: Array, instrument: Array, gusts: float = 1.0) -> bool:
+    """Whether the pitching moment's surfaces are said to do nothing but answer gusts, by signals over time."""
+    signals = layout(AIRCRAFT, ("q",))
+    plan = normal_equations.normal_equations({"Cm": ("q", "de")}, signals)
+    lines = np.zeros((rate.size, signals.width))
+    lines[:, signals.column("q")], lines[:, signals.instrument("q")] = rate, instrument
+    (found,) = gust_correlation.only_answered(plan, lines.T @ lines, np.array([gusts]))
+    return bool(found)
+
+
+@pytest.mark.parametrize("gain", [0.3, 1.0, 8.0])
+def test_a_loop_that_does_nothing_but_answer_gusts_is_seen_whatever_its_gain(gain: float) -> None:
+    """x = z + g with z = -L x': the slope of x on z is -1 / L. Half of x is what the loop does not see."""
+    rng = np.random.default_rng(4)
+    seen, unseen = rng.normal(size=(2, 500)) / (1.0 + gain)
+    assert answered(seen + unseen, -gain * seen)
+
+
+def test_a_flight_with_a_manoeuvre_is_not_taken_for_one_that_answers_gusts() -> None:
+    """Not with a file that is wrong by half, nor with one whose surface has the wrong sign, nor in still air."""
+    rng = np.random.default_rng(5)
+    manoeuvre, gusts = rng.normal(size=(2, 500))
+    rate = manoeuvre + 0.7 * gusts
+    for wrong in (0.5, 1.0, 1.5, -1.0):
+        assert not answered(rate, wrong * manoeuvre)
+    answers, left = -0.8 * gusts, 0.2 * (gusts + rng.normal(size=500))
+    assert answered(left, answers)
+    assert not answered(left, answers, gusts=0.0)
+
+
+def test_a_rate_that_has_no_instrument_tells_nothing() -> None:
+    assert not answered(np.ones(5), np.zeros(5))
