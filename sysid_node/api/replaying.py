@@ -23,6 +23,7 @@ from sysid_node.faults.settings import FaultMonitorSettings as FaultSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import counts_by_reason, joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.commanded import carried_in_words
+from sysid_node.flight.live.deflections import DeflectionLimits
 from sysid_node.flight.live.mean_force import MeanForce
 from sysid_node.flight.live.mean_lift import MeanLift
 from sysid_node.flight.logs.opening import carried_by
@@ -37,7 +38,7 @@ from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_
 from sysid_node.online.estimates.log import EstimatesLog
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.settings import FIRST_ESTIMATE, OnlineSettings, too_short_to_replay
-from sysid_node.online.types import AZ, LIFT, Estimates
+from sysid_node.online.types import AZ, LIFT, Estimates, controls_in
 from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.files.runs.estimates_bag import write_estimates
 from sysid_node.report.files.runs.run_folder import REPORT, write_aircraft, write_run
@@ -188,7 +189,7 @@ class _Run:
         self.samples = RecordedSamples(aircraft, flight.imu_messages)
         self.flow = flow_angle_filter.init(as_estimated(aircraft))
         self.attitudes = _Attitudes()
-        self.force, self.lift = MeanForce(), MeanLift(aircraft)
+        self.force, self.lift, self.deflections = MeanForce(), MeanLift(aircraft), DeflectionLimits(aircraft)
         self.spans: dict[str, tuple[float, float]] = {}  # s, by topic
         self.joints: tuple[str, ...] = ()
         self.commands_from, self.frame_id = math.inf, ""
@@ -210,9 +211,11 @@ class _Run:
         self.began = min(self.began, float(aligned.time[0])) if aligned.time.size else self.began
         self.force.add(aligned.time, aligned.samples[:, AZ])
         self.lift.add(aligned.time, *aligned.samples[:, LIFT].T)
+        self.deflections.add(aligned.time, aligned.samples[:, controls_in(self.aircraft)])
         if piece.last:
             self.force.check(self.flight.name)
             self.lift.check(self.flight.name)
+            self.deflections.check(self.flight.name)
         self._identify(aligned, count)
         self._keep(aligned, streams)
         if self.monitor is not None:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import counts_by_reason
 from sysid_node.flight.commanded import carried_in_words
+from sysid_node.flight.live.deflections import DeflectionLimits
 from sysid_node.flight.live.mean_lift import RecentMeanLift
 from sysid_node.flight.live.monitor import Durations
 from sysid_node.online import estimator
@@ -21,7 +22,7 @@ from sysid_node.online.estimates.model_gap import CoefficientGap, model_gap
 from sysid_node.online.estimates.published import estimate_of
 from sysid_node.online.estimates.servo_gap import ServoGap, servo_gaps, servo_times_in_file
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.types import LIFT, Estimates
+from sysid_node.online.types import LIFT, Estimates, controls_in
 
 _of_lift = itemgetter(*LIFT)
 BUSY = 0.4  # share of the time between estimates in which nothing long is begun before the next
@@ -43,6 +44,7 @@ class Session:
         self.settings = settings
         self.publish_rate = publish_rate  # Hz
         self.update_times = Durations()
+        self._controls = controls_in(aircraft)
         self._servo_times = servo_times_in_file(aircraft)
         self.reset()
 
@@ -52,6 +54,7 @@ class Session:
         self.alignment = streaming.init(self.aircraft, self.settings.max_gap, self.settings.actuators)
         self.schedule = schedule.Schedule(self.publish_rate)
         self.lift = RecentMeanLift(self.aircraft)
+        self.deflections = DeflectionLimits(self.aircraft)
         self.samples = 0
         self._correlated: object = None  # the slowly changing quantities whose covariance was asked for last
         self._heard = time.monotonic()
@@ -162,6 +165,7 @@ class Session:
             self.update_times.add(time.perf_counter() - start)
             self.samples += 1
             self.lift.add(moment, *_of_lift(sample))
+            self.deflections.add_sample(moment, sample[self._controls])
             self._heard = time.monotonic()
             if schedule.due(self.schedule, moment, wait):
                 results.append(self.now())

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from sysid_node.aircraft.model import Aircraft
+
 #: Columns of an aligned sample before the aerodynamic controls (which follow in the aircraft file's order).
 #: Specific force at the IMU m/s^2, rates rad/s, airspeed m/s, flow angles at the air-data probe rad,
 #: air density kg/m^3, thrust N (NaN = not measured), and the time between the two air-data messages that the
@@ -14,6 +16,11 @@ from typing import NamedTuple
 SAMPLE_COLUMNS = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "thrust", "air_interval")
 AZ = SAMPLE_COLUMNS.index("az")  # place of the specific force along z in a sample
 LIFT = tuple(SAMPLE_COLUMNS.index(name) for name in ("az", "V", "alpha", "rho"))  # places of what tells of the lift
+
+
+def controls_in(aircraft: Aircraft) -> slice:
+    """The places of an aircraft's controls in a sample, which may hold the same behind servos after them."""
+    return slice(len(SAMPLE_COLUMNS), len(SAMPLE_COLUMNS) + len(aircraft.controls))
 
 
 class DerivativeEstimate(NamedTuple):

@@ -246,7 +246,8 @@ class Identifier(CarefulNode):
         recent = self._recent.update(monitors, rejected)
         readings, max_gap = (session.force_fault, session.unchanging), session.settings.max_gap
         doubled = [f"{topic}: {text}" for topic, text in several_publishers(self, self._inputs).items()]
-        doubt = "; ".join(filter(None, (session.lift_fault, session.interruptions, *doubled)))
+        doubts = (session.lift_fault, session.deflections.fault, session.interruptions, *doubled)
+        doubt = "; ".join(filter(None, doubts))
         message.status.append(source.input(monitors, rejected, stale_after, recent, readings, max_gap, doubt))
         self._warn(session, monitors, recent)
         if not session.samples:
@@ -289,6 +290,8 @@ class Identifier(CarefulNode):
             present["readings"] = session.unchanging
         if session.lift_fault:
             present["lift"] = session.lift_fault
+        if session.deflections.fault:
+            present["deflections"] = session.deflections.fault
         if session.interruptions:
             present["samples"] = session.interruptions
         if session.samples and lag_level(self._lag) != DiagnosticStatus.OK:

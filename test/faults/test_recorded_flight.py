@@ -83,7 +83,7 @@ def test_it_is_what_the_live_functions_say_message_by_message(flight: Streams, v
 
 
 def test_what_is_silent_and_what_does_not_follow(flight: Streams) -> None:
-    """Air data stop for 2 s; positions are those of servos that were told something else for a second."""
+    """Air data stop for 2 s; the rudder does not follow for a second, and then it does."""
     short = shortened(flight, 0.0, 12.0)
     arrival = short.air_data.arrival
     heard = ~((arrival.log_ns > arrival.log_ns[0] + 4e9) & (arrival.log_ns < arrival.log_ns[0] + 6e9))
@@ -91,8 +91,11 @@ def test_what_is_silent_and_what_does_not_follow(flight: Streams) -> None:
     air = dataclasses.replace(
         short.air_data, arrival=dataclasses.replace(arrival, **fields), values=short.air_data.values[heard]
     )
-    joints = short.actuators
-    place = joints.names.index("rudder")
+    place = short.actuators.names.index("rudder")
+    positions = short.actuators.positions.copy()
+    seconds = (short.actuators.arrival.log_ns - int(short.actuators.arrival.log_ns[0])) / 1e9
+    positions[:, place] += 0.025 * np.clip(seconds - 9.0, 0.0, 1.0)  # what stands still is not seen to follow
+    joints = dataclasses.replace(short.actuators, positions=positions)
     commands = []
     for log_ns, stamp_ns, row in zip(
         joints.arrival.log_ns.tolist(), joints.arrival.stamp_ns.tolist(), joints.positions.tolist(), strict=True
@@ -100,7 +103,9 @@ def test_what_is_silent_and_what_does_not_follow(flight: Streams) -> None:
         told = list(row)
         told[place] += 0.2 * (8.0 < (log_ns - int(joints.arrival.log_ns[0])) / 1e9 < 9.0)
         commands.append(JointMessage(log_ns, stamp_ns, joints.names, tuple(told)))
-    found = judge(AIRCRAFT, FaultMonitorSettings(), dataclasses.replace(short, air_data=air), commands).episodes
+    found = judge(
+        AIRCRAFT, FaultMonitorSettings(), dataclasses.replace(short, air_data=air, actuators=joints), commands
+    ).episodes
     assert [(e.fault.kind in {SILENT, STUCK, NOT_FOLLOWING}, e.fault.part) for e in found] == [
         (True, "air_data"),
         (True, "rudder"),

@@ -124,6 +124,16 @@ def test_airspeed_in_another_unit_is_said_in_flight(session: Session, scale: flo
     assert ("is the airspeed in m/s" in session.lift_fault) == said
 
 
+@pytest.mark.parametrize(("scale", "said"), [(1.0, False), (1.0 / 0.35, True)])
+def test_surfaces_as_shares_of_their_travel_are_said_in_flight(scale: float, said: bool) -> None:
+    """Steps to 0.2 rad of 0.35, taken as commands. Derivatives by shares would be valid, and wrong."""
+    session, flight = Session(load_aircraft("cdrw"), OnlineSettings(), 10.0), made_up_streams(6.0)
+    flight.actuators.positions[:, 0] = scale * 0.2 * ((np.arange(600) // 50) % 2)
+    fly(session, flight, "iaj")
+    assert session.commanded
+    assert session.deflections.fault.startswith("elevator is deflected by up to 0.57 rad") == said
+
+
 @pytest.mark.parametrize(("hole", "said"), [(0.25, True), (0.15, False)])
 def test_an_imu_that_is_interrupted_every_second_is_said_in_flight(session: Session, hole: float, said: bool) -> None:
     """Nothing is ever estimated from parts that short; a hole shorter than ``max_gap`` is bridged."""

@@ -80,12 +80,19 @@ class LikelihoodProblem(ABC):
         return np.concatenate([*parts, (mean - z[index]) / sigma])
 
     def jacobian(self, z: Array, noise: Array) -> Array:
-        """The Jacobian of ``residuals`` with respect to z."""
+        """The Jacobian of ``residuals`` with respect to z; raises InputError where it is not finite."""
         index, _, sigma = self.priors()
         prior = np.zeros((index.size, z.size))
         prior[np.arange(index.size), index] = -1.0 / sigma
         parts = [-in_noise_units(block, noise).reshape(-1, z.size) for block in self.sensitivities(z)]
-        return np.concatenate([*parts, prior])
+        found = np.concatenate([*parts, prior])
+        if not np.isfinite(found).all():
+            raise InputError(
+                f"model {self.unknowns.model.name} becomes so unstable in the search that its sensitivities exceed all "
+                "numbers; cut the flight into shorter pieces (segment), use the aircraft file's tolerances "
+                "(use_prior), or leave out what the flight does not move (states)"
+            )
+        return found
 
     def check(self, z: Array) -> None:
         """Raises InputError with too few measurements, or where the model does not stay finite at ``z``."""

@@ -25,6 +25,13 @@ from sysid_node.batch.settings import BatchSettings
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
 
+#: Log of the factor by which the residuals of one set of start values are larger than another's, to be far worse.
+_FAR_WORSE = float(np.log(10.0))
+_FROM_FILE = (
+    "started from the aircraft file's values: with those of equation error the model moves quite otherwise than the "
+    "aircraft did"
+)
+
 
 @dataclass(frozen=True)
 class MaximumLikelihoodEstimation:
@@ -51,10 +58,14 @@ class MaximumLikelihoodEstimation:
         Raises InputError where these are too short.
         """
         require_length(self.model, self.aircraft, records)
+        pieces = [_pieces(self.method, self.model, self.aircraft, record, self.settings) for record in records]
+        here = replace(self, pieces=tuple(piece for several in pieces for piece in several))
         started, remark = _started(self.model, self.aircraft, records)
-        pieces = [_pieces(self.method, started, self.aircraft, record, self.settings) for record in records]
-        flat = tuple(piece for several in pieces for piece in several)
-        return replace(self, model=started, pieces=flat, remarks=(*self.remarks, *remark))
+        there = replace(here, model=started)
+        # a filter is corrected at every output, so that its predictions do not diverge
+        if self.method == "output_error" and there._misfit() - here._misfit() > _FAR_WORSE:
+            return replace(here, remarks=(*self.remarks, _FROM_FILE))
+        return replace(there, remarks=(*self.remarks, *remark))
 
     def fit(self) -> BatchFit:
         """The fit, with the responses to the pieces of each flight joined. Raises InputError as the method does."""
@@ -79,6 +90,13 @@ class MaximumLikelihoodEstimation:
             return self._problem([piece for several in pieces for piece in several]).residuals(z, noise)
 
         return residuals, base.jacobian(z, noise)
+
+    def _misfit(self) -> float:
+        """The mean logarithm of the residuals' standard deviations at the start values; inf where these diverge."""
+        problem = self._problem(self.pieces)
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = float(np.mean(np.log(np.diag(problem.noise(problem.start())))))
+        return found if np.isfinite(found) else np.inf
 
     def _problem(self, pieces: Sequence[ManoeuvreData]) -> LikelihoodProblem:
         unknowns = Unknowns.of(self.model, pieces, self.model.states, self.settings.biases)

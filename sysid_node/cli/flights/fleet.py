@@ -134,7 +134,7 @@ def _show(found: FleetReport, out: Path) -> None:
     tails = {(flight.aircraft, flight.tail) for flight in results.flights}
     print(f"{plural(len(results.flights), 'flight')} of {len(tails)} aircraft, {len(results.refusals)} refused")
     for refusal in results.refusals[:_SHOWN]:
-        print(f"  refused {refusal.flight}: {refusal.reason}")
+        print(f"  refused {refusal.flight}: {refusal.reason.removeprefix(f'{refusal.flight}: ')}")
     if len(results.refusals) > _SHOWN:
         print(f"  and {len(results.refusals) - _SHOWN} more in {out / 'refusals.csv'}")
     remarks = [(flight.flight, remark) for flight in results.flights for remark in flight.remarks]

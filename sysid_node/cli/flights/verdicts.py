@@ -16,6 +16,7 @@ from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.frames import BodyFrame
+from sysid_node.flight.live.deflections import DeflectionLimits
 from sysid_node.flight.live.interruptions import Interruptions
 from sysid_node.flight.live.mean_force import MeanForce
 from sysid_node.flight.live.mean_lift import MeanLift
@@ -24,7 +25,7 @@ from sysid_node.flight.logs.opening import carried_by, load_flight_record
 from sysid_node.flight.pieces import flight_pieces
 from sysid_node.online.alignment.in_pieces import PieceAlignment
 from sysid_node.online.settings import FIRST_ESTIMATE, OnlineSettings, too_short_to_replay
-from sysid_node.online.types import AZ, LIFT
+from sysid_node.online.types import AZ, LIFT, controls_in
 
 #: The shortest flight that ``sysid gap`` diagnoses, s (``gap.flightdata.gap_flight``, which takes long to load).
 SHORTEST_FOR_GAP = 6.0
@@ -109,6 +110,7 @@ def _replayed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame)
         spans: dict[str, tuple[float, float]] = {}
         names: tuple[str, ...] = ()
         force, lift, interruptions = MeanForce(), MeanLift(aircraft), Interruptions()
+        deflections = DeflectionLimits(aircraft)
         began = last = math.nan
         for piece in flight.pieces:
             names, spans = piece.streams.actuators.names, joined_spans(spans, stamp_spans(piece.streams))
@@ -119,9 +121,11 @@ def _replayed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame)
                 began, last = float(aligned.time[0]) if math.isnan(began) else began, float(aligned.time[-1])
             force.add(aligned.time, aligned.samples[:, AZ])
             lift.add(aligned.time, *aligned.samples[:, LIFT].T)
+            deflections.add(aligned.time, aligned.samples[:, controls_in(aircraft)])
         if force.count:
             force.check(flight.name)
             lift.check(flight.name)
+            deflections.check(flight.name)
             if last - began < FIRST_ESTIMATE:
                 raise InputError(too_short_to_replay(flight.name, last - began))
             if broken := interruptions.fault(last, max_gap):

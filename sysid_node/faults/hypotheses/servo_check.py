@@ -1,7 +1,8 @@
 """Compares the measured positions of the surfaces with their commands, where both are available.
 
 A surface whose position differs from the lagged command by more than the servo's error for some time is stuck, hard
-over or does not follow (Ducard, "Fault-tolerant Flight Control and Guidance Systems" (2009), ch. 3). Where
+over or does not follow (Ducard, "Fault-tolerant Flight Control and Guidance Systems" (2009), ch. 3). The fault ends
+when the position has agreed with the command for some time and has moved meanwhile. Where
 ``actuators`` repeats the commands, this check finds nothing, and faults are found by forces alone.
 """
 
@@ -25,6 +26,7 @@ Array = NDArray[np.float64]
 
 LASTING = 0.3  # s for which a position must differ, to be a fault
 FOLLOWING = 1.0  # s for which it must agree, to end the fault
+MOVED = 0.5  # of the servo's error by which it must move meanwhile, as a stuck surface agrees with a command at rest
 STILL = 0.005  # rad: a surface that moves less is stuck
 RECENT = 0.5  # s of positions that decide whether it moves
 COMMAND_AGE = 0.15  # s: older commands are not compared
@@ -40,6 +42,8 @@ class ServoCheckState:
     command: Array  # rad, NaN before the first
     off_since: Array  # s, beginning of the present difference; inf = none
     off_at: Array  # s, time of the last difference
+    lowest: Array  # rad, of the positions since then
+    highest: Array
     pending: deque[tuple[float, Array]] = field(default_factory=lambda: deque(maxlen=2000))  # commands by time (s)
     commanded: float = -math.inf  # s
     expected: Array | None = None  # behind the lag
@@ -52,7 +56,8 @@ def init(aircraft: Aircraft, settings: FaultMonitorSettings) -> ServoCheckState:
     """The state before the first message."""
     limits = np.array([control.limit or LIMIT for control in aircraft.controls.values()])
     never = np.full(limits.size, math.inf)
-    return ServoCheckState(tuple(aircraft.controls), limits, settings, np.full(limits.size, math.nan), never, -never)
+    none = np.full(limits.size, math.nan)
+    return ServoCheckState(tuple(aircraft.controls), limits, settings, none, never, -never, never, -never)
 
 
 def command(state: ServoCheckState, time: float, controls: Sequence[float]) -> None:
@@ -86,10 +91,13 @@ def position(state: ServoCheckState, time: float, controls: Sequence[float]) -> 
     off = np.abs(found - state.expected) > state.settings.servo_error
     state.off_since = np.where(off, np.minimum(state.off_since, time), math.inf)
     state.off_at = np.where(off, time, state.off_at)
+    state.lowest = np.where(off, found, np.minimum(state.lowest, found))
+    state.highest = np.where(off, found, np.maximum(state.highest, found))
+    moved = state.highest - state.lowest > MOVED * state.settings.servo_error
     for i, name in enumerate(state.names):
         if time - state.off_since[i] >= LASTING:
             state.found[name] = _fault(state, i, time, state.found.get(name))
-        elif time - state.off_at[i] > FOLLOWING:
+        elif time - state.off_at[i] > FOLLOWING and moved[i]:
             state.found.pop(name, None)
     return list(state.found.values())
 

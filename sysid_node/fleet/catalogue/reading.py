@@ -56,9 +56,10 @@ def read_catalogue(path: str | Path, aircraft: str | None = None) -> Catalogue:
     found = list(rows)
     if not found:
         raise InputError(f"catalogue {path}: has no flights; give a line for each")
-    base = path.absolute().parent
+    path = path.absolute()
+    base = path.parent
     notes = [_note(row, base) for row in found if row["maintenance"]]
-    flights = [flight for row in found if row["path"] for flight in _flights(row, base, aircraft or default)]
+    flights = [flight for row in found if row["path"] for flight in _flights(row, path, aircraft or default)]
     return _unique(Catalogue(tuple(flights), tuple(sorted(notes, key=lambda note: (note.tail, note.date)))))
 
 
@@ -153,14 +154,14 @@ def date_of(text: str) -> datetime.datetime:
     return found.astimezone(datetime.UTC) if found.tzinfo else found.replace(tzinfo=datetime.UTC)
 
 
-def _flights(row: _Row, base: Path, aircraft: str) -> Iterator[CatalogueFlight]:
-    """The flights that an entry stands for."""
-    given = row["aircraft"]
+def _flights(row: _Row, catalogue: Path, aircraft: str) -> Iterator[CatalogueFlight]:
+    """The flights that an entry of the ``catalogue`` stands for."""
+    given, base = row["aircraft"], catalogue.parent
     chosen = _aircraft_path(given, base) if given else aircraft
     entry = CatalogueFlight("", row["path"], chosen, row["tail"], "", row["configuration"])
     try:
         entry = replace(entry, date=date_of(row["date"]) if row["date"] else None)
-        found = _of_pattern(row["path"], locations.expanded(row["path"], base))
+        found = _of_pattern(row["path"], locations.expanded(row["path"], base), catalogue)
     except ValueError as error:
         yield replace(entry, flight=row["flight"] or row["path"], fault=f"{row.where}: {error}")
         return
@@ -175,12 +176,12 @@ def _flights(row: _Row, base: Path, aircraft: str) -> Iterator[CatalogueFlight]:
         yield replace(entry, flight=name, location=location, fault=fault or _fault_at(location))
 
 
-def _of_pattern(pattern: str, found: list[str]) -> list[str]:
-    """What a pattern matches, without files that are no flights, files of bags, and folders of flights."""
+def _of_pattern(pattern: str, found: list[str], catalogue: Path) -> list[str]:
+    """What a pattern matches, without the catalogue, other files that are no flights, files of bags, and folders."""
     if found == [pattern] or not locations.has_marks(pattern):
         return found
     bags = {path for path in found if not locations.is_remote(path) and (Path(path) / "metadata.yaml").is_file()}
-    kept = [path for path in found if not bags.intersection(map(str, Path(path).parents))]
+    kept = [path for path in found if path != str(catalogue) and not bags.intersection(map(str, Path(path).parents))]
     flights = [path for path in kept if path in bags or Path(path).suffix.lower() not in _SKIPPED]
     folders = {str(folder) for path in flights for folder in Path(path).parents}
     return [path for path in flights if path not in folders]

@@ -16,6 +16,7 @@ from sysid_node.flight.bag.reader import open_bag, read_streams, reading
 from sysid_node.flight.commands import JointMessage, read_commands
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
+from sysid_node.flight.live.deflections import checked_deflections
 from sysid_node.flight.live.mean_force import checked_force
 from sysid_node.flight.live.mean_lift import checked_lift
 from sysid_node.flight.logs.autopilot_log import AutopilotLog, with_outputs_of
@@ -120,10 +121,16 @@ def load_flight_record(
     ``carried``: what the actuators' messages, or a table's columns, are ("commands", "positions", or "auto").
     """
     if is_table(path, topics, frame):
-        return with_commands(aircraft, checked_lift(aircraft, checked_force(read_csv(path))), carried)
+        record = _checked(aircraft, read_csv(path))
+        return with_commands(aircraft, record, carried)
     streams = open_streams(path, aircraft, topics, frame)
     record = flight_record(aircraft, streams, max_gap, carried_by(streams, carried))
-    return checked_lift(aircraft, checked_force(record))
+    return _checked(aircraft, record)
+
+
+def _checked(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
+    """The record as it is. Raises InputError and warns where it is not a flight of this aircraft in these units."""
+    return checked_deflections(aircraft, checked_lift(aircraft, checked_force(record)))
 
 
 def is_table(path: str | Path, topics: Mapping[str, str] | None = None, frame: BodyFrame = "flu") -> bool:

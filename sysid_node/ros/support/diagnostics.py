@@ -127,7 +127,7 @@ def lag_level(lag: float) -> bytes:
 def lag_words(lag: float) -> str:
     """How late (s) an estimate was published, in words."""
     if not abs(lag) < FOREIGN_CLOCK:
-        return "of another clock's stamps"
+        return "with stamps of another clock, by which its delay is not known"
     return f"{1e3 * lag:.1f} ms after its sample" if lag > -LATE else f"{-lag:.1f} s before the stamp of its sample"
 
 

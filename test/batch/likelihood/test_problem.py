@@ -48,3 +48,11 @@ def test_too_few_measurements_are_refused(problem):
     short.manoeuvre.outputs[:] = outputs
     with pytest.raises(InputError, match="9 measured values for 5 unknowns"):
         short.check(short.start())
+
+
+def test_sensitivities_beyond_all_numbers_are_refused():
+    """As of a model that tumbles: its responses stay finite, and their derivatives do not."""
+    problem = LineProblem()
+    problem.directions[100:] = np.inf
+    with pytest.raises(InputError, match="becomes so unstable in the search"):
+        problem.jacobian(problem.start(), np.eye(3))

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from made_flight import KESTREL, clean, flight
+from made_flight import KESTREL, TRUTH, clean, flight
 
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.maximum_likelihood_estimation import MaximumLikelihoodEstimation
@@ -33,6 +33,17 @@ def test_the_search_starts_at_equation_errors_estimates():
     start = dict(zip(estimation.model.names, estimation.model.start, strict=True))
     assert start["Cm_q"] == pytest.approx(found["Cm_q"])
     assert not estimation.remarks
+
+
+def test_where_equation_errors_estimates_diverge_the_search_starts_at_the_files():
+    """With q of the wrong sign, equation error finds an aircraft that is unstable in pitch."""
+    record = flight(1)
+    reversed_pitch = dataclasses.replace(record, columns=dict(record.columns) | {"q": -record.columns["q"]})
+    assert equation_error(KESTREL, [reversed_pitch]).estimates["Cm_alpha"].value > 0.0
+    estimation = MaximumLikelihoodEstimation.of("output_error", KESTREL, [reversed_pitch], BatchSettings())
+    start = dict(zip(estimation.model.names, estimation.model.start, strict=True))
+    assert start["Cm_alpha"] == TRUTH["Cm_alpha"]
+    assert "started from the aircraft file's values" in estimation.remarks[-1]
 
 
 def test_other_flights_use_the_same_compiled_equations():

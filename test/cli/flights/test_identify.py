@@ -10,7 +10,7 @@ from short_bags import short_bag
 
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import load_aircraft
-from sysid_node.api import identify, load
+from sysid_node.api import identify, load, replay
 from sysid_node.batch.identify import METHODS
 from sysid_node.cli.main import main
 from sysid_node.errors import InputWarning
@@ -65,6 +65,16 @@ def test_what_is_odd_about_a_flight_is_in_the_report_as_well(tmp_path):
     with pytest.warns(InputWarning, match="mean lift coefficient") as told:
         found = identify(load(short_bag("cdrw_random", 12.0, tmp_path), tmp_path / "heavy.yaml"), "equation_error")
     assert found.run.remarks[0] == str(told[0].message)
+
+
+def test_deflections_beyond_the_files_limits_are_warned_of(tmp_path):
+    aircraft = load_aircraft("cdrw")
+    controls = {name: replace(control, limit=0.01) for name, control in aircraft.controls.items()}
+    (tmp_path / "small.yaml").write_text(dump_aircraft(replace(aircraft, controls=controls)))
+    flight = load(short_bag("cdrw_random", 12.0, tmp_path), tmp_path / "small.yaml")
+    for work in (replay, lambda flight: identify(flight, "equation_error")):
+        with pytest.warns(InputWarning, match=r"elevator is deflected .* beside a limit of 0\.01 rad"):
+            work(flight)
 
 
 def test_the_bundled_flights_truth_is_found(summary):

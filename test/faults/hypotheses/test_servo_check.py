@@ -51,6 +51,21 @@ def test_a_stuck_surface_shows_at_once(place: float, kind: str) -> None:
     assert fault.found - fault.since == pytest.approx(servo_check.LASTING, abs=2 * STEP)
 
 
+def test_a_stuck_surface_is_stuck_while_its_command_rests_where_it_stands() -> None:
+    """A jam at level flight's deflection shows in each manoeuvre, and is not over after it; it is once it follows."""
+    state = servo_check.init(AIRCRAFT, FaultMonitorSettings())
+    faults = {}
+    for k in range(3000):
+        now = k * STEP
+        asked = 0.1 if 1.0 <= now < 2.0 or now >= 20.0 else 0.0
+        servo_check.command(state, now, [asked, 0.0, 0.0])
+        at = 0.0 if now < 22.0 else min(0.1, now - 22.0)
+        faults[k] = servo_check.position(state, now, [at, 0.0, 0.0])
+    assert [fault.kind for fault in faults[1999]] == [STUCK]
+    assert faults[2100][0].since == faults[1999][0].since
+    assert faults[2999] == []
+
+
 def test_a_surface_that_moves_but_not_where_it_should() -> None:
     (fault,) = flown(4.0, -0.2, drift=0.05)
     assert fault.kind == NOT_FOLLOWING

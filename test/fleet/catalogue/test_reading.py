@@ -47,6 +47,15 @@ def test_a_pattern_passes_over_what_is_no_flight(tmp_path: Path) -> None:
     assert [f.flight for f in read_catalogue(tmp_path / "all.csv").flights if "7" in f.flight] == ["7/a.csv", "7/bag"]
 
 
+def test_a_pattern_passes_over_the_catalogue_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    logs(tmp_path, "a.csv", "b.csv")
+    (tmp_path / "fleet.csv").write_text("path,aircraft,tail\n*.csv,cdrw,7\n")
+    (tmp_path / "beside").mkdir()
+    monkeypatch.chdir(tmp_path / "beside")
+    for path in (tmp_path / "fleet.csv", Path("../fleet.csv")):
+        assert [flight.flight.rpartition("/")[2] for flight in read_catalogue(path).flights] == ["a.csv", "b.csv"]
+
+
 def test_a_table_with_semicolons_and_one_with_a_column_twice(tmp_path: Path) -> None:
     logs(tmp_path, "a.csv")
     (tmp_path / "fleet.csv").write_text("path;aircraft;tail;maintenance\na.csv;cdrw;7;\n")

@@ -158,7 +158,8 @@ def test_times_are_told_by_their_percentiles() -> None:
 
 
 def test_a_replay_has_no_lag_worth_telling() -> None:
-    assert SOURCE.computation({}, 1e8).message == "last estimate of another clock's stamps"
+    said = "last estimate with stamps of another clock, by which its delay is not known"
+    assert SOURCE.computation({}, 1e8).message == said
 
 
 def test_a_rate_is_over_the_time_since_it_was_last_asked_for() -> None:
