@@ -127,7 +127,7 @@ class InstrumentChecks:
     strength: InstrumentStrength  # of the instruments on the regressors
     selection_bias_factors: Array  # (P, C) see ``selection_bias``
     anderson_rubin: AndersonRubinBounds  # of the intervals
-    answer_gusts: NDArray[np.bool_]  # (C,) coefficients of an axis whose surfaces do nothing but answer gusts
+    only_answered: NDArray[np.bool_]  # (C,) coefficients of an axis whose surfaces do nothing but answer gusts
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from sysid_node.online.estimates.current_solution import CurrentSolution
 from sysid_node.online.regression import least_squares, normal_equations
 from sysid_node.online.regression.gust_correlation import MOMENTS
 from sysid_node.online.regression.least_squares import student_95
+from sysid_node.online.regression.normal_equations import ModelStructure
 from sysid_node.online.state import EstimatorState, SegmentSolution, ValidityBasis
 from sysid_node.online.status import Codes
 
@@ -108,9 +109,8 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     for symbol, axis in _felt_at_another_time(state, latest):
         objections[axis[c]] = words.code(f"{symbol} not on time")
     for symbol in _ahead_of_commands(state, latest):
-        of_it = solved.belongs[np.array(solved.regressors) == symbol].any(axis=0)
-        objections[np.asarray(of_it)[c] & ~table.offset] = words.code(f"{symbol} not on time")
-    objections[latest.instruments.answer_gusts[c]] = words.code("surfaces answer gusts")
+        objections[_with_control(solved, symbol)[c] & ~table.offset] = words.code(f"{symbol} not on time")
+    objections[latest.instruments.only_answered[c]] = words.code("surfaces answer gusts")
     objections[(latest.uncertainty.freedom < ENOUGH_FREEDOM)[c]] = status.CONVERGING
     if not state.inputs.thrust_known:
         objections[table.needs_thrust] = status.THRUST
@@ -125,7 +125,7 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
 
 
 def _felt_at_another_time(state: EstimatorState, latest: SegmentSolution) -> list[tuple[str, Flags]]:
-    """Controls of whose time all derivatives of a moment depend, and the coefficients (C,) that they are wrong for.
+    """The controls on whose time all derivatives of a moment depend, and the coefficients (C,) that are wrong with it.
 
     When a deflection is felt is a property of the control, and the moment tells it best. Lift and drag, or the side
     force, have the same regressors and instruments; that their own equations do not show it makes them no better. A
@@ -135,9 +135,13 @@ def _felt_at_another_time(state: EstimatorState, latest: SegmentSolution) -> lis
     found, belongs = [], structure.belongs > 0.0
     for i, symbol in lag.lagging_control.items():
         if structure.coefficients[i] in MOMENTS and lag.biased[belongs[:, i], i].all():
-            of_it = belongs[np.array(structure.regressors) == symbol].any(axis=0)
-            found.append((symbol, np.asarray(of_it & (structure.block == structure.block[i]))))
+            found.append((symbol, _with_control(structure, symbol) & (structure.block == structure.block[i])))
     return found
+
+
+def _with_control(structure: ModelStructure, symbol: str) -> Flags:
+    """(C,) coefficients among whose regressors a control is."""
+    return np.asarray((structure.belongs[np.array(structure.regressors) == symbol] > 0.0).any(axis=0))
 
 
 def _ahead_of_commands(state: EstimatorState, latest: SegmentSolution) -> tuple[str, ...]:

@@ -15,8 +15,9 @@ the same instruments, and so the largest ratio among their moments.
 
 Where the surfaces do nothing but answer gusts, all of this is too little. What the surfaces do then is opposed to what
 the gusts do: of the measured rate x = z + g, with the instrument z and the gusts' part g, a feedback of loop gain L
-makes z = -L g / (1 + L), and the slope of x on z is -1 / L. A flight in which the surfaces are moved on purpose has a
-slope of about 1, whatever the gusts are; errors of the file by a third change it by about as much.
+makes z = -L g / (1 + L), and the slope of x on z is -1 / L: without other excitation a closed loop shows the inverse of
+its feedback (Soderstrom & Stoica, "System Identification" (1989), ch. 10). A flight in which the surfaces are moved on
+purpose has a slope of about 1, whatever the gusts are; an error of the file by a third changes it by about as much.
 """
 
 from __future__ import annotations
@@ -38,9 +39,8 @@ ALLOWED = 0.05  # correlation between instruments and gusts, where surfaces are 
 ANSWERED = 0.15  # that correlation where the gusts' moments have the energy of the moments by deflections
 MOMENTS = ("Cl", "Cm", "Cn")
 RATES = ("p", "q", "r")
-#: Slope of a rate on its instrument under which the surfaces answer gusts, unless the rate follows the instrument: the
-#: second is the correlation from which on it does. A surface with the wrong sign in the file has the slope -1.
-OPPOSED, FOLLOWED = 0.1, 0.75
+OPPOSED = 0.1  # slope of a rate on its instrument under which the surfaces are said to answer gusts,
+FOLLOWED = 0.75  # unless their correlation is above this, as where the file has a surface with the wrong sign
 NOTABLE = 0.1  # share of gusts in the residuals of an axis from which on it matters that surfaces answer them
 #: By coefficient those whose residuals tell of gusts in its regressors, which are the same for a whole axis. What is
 #: left of the drag counts for the drag alone: most of it is of a polar that no derivative describes.
