@@ -13,6 +13,7 @@ what the derivatives can absorb, as a mass that scales those of all forces, move
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -31,6 +32,7 @@ from sysid_node.batch.systematic.sensitivities import RegressionResponse, Respon
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.online.estimates.published import SERVO_KNOWN
 from sysid_node.online.systematic.budget import Budget
+from sysid_node.online.systematic.imperfections import HELD_OR_NOT
 
 SMALLEST = 1e-6  # s, or s^2: of a step
 
@@ -93,11 +95,15 @@ def _taken_into_account(aircraft: Aircraft, posterior: FlightPosterior) -> Array
 
 
 def servos(posterior: FlightPosterior) -> dict[str, ParameterEstimate]:
-    """How late each control follows what is recorded of it, s; of commands where some flights have them."""
+    """How late each control follows what is recorded of it, s; of commands where some flights have them.
+
+    Where none is known to have them, the standard error contains what holding them would make it later.
+    """
     rows: dict[str, ParameterEstimate] = {}
     found = zip(posterior.imperfections, posterior.mean.tolist(), posterior.errors.tolist(), strict=True)
     for one, value, error in sorted(found, key=lambda item: item[0].commanded):
         if one.role == "lateness":
+            error = error if one.commanded else math.hypot(error, HELD_OR_NOT)
             lower, upper = confidence_interval(value, error, np.inf)
             valid = error <= SERVO_KNOWN
             status = "ok" if valid else "converging"

@@ -38,6 +38,9 @@ OF_ONE_TYPE = 0.8
 COMPLETE = 0.02 / 0.93
 #: The largest root of a correlation by a shared damping: that of one would have no inverse.
 ALIKE = 0.99
+#: Where messages may be positions or commands: 1 sigma of the lateness (s) that this leaves open. Held commands are half
+#: an interval later than the lines between them, at most 0.01 s at 50 Hz: a rectangular distribution (GUM, sec. 4.3.7).
+HELD_OR_NOT = 0.01 / math.sqrt(3.0)
 SMALLEST = 1e-4  # s: 1 sigma of a servo of which only the rate limit is not exactly known
 KNOWN = 0.03  # s: the largest 1 sigma of a servo of which something is known
 SHORTEST = 0.02  # s: the lateness from which on the tolerances of B and of the third coefficient go with it
@@ -58,6 +61,7 @@ class Imperfections:
     columns: ServoColumns
     stamps: float  # s: 1 sigma of the lateness of the stamps of controls and motion, against each other
     step_time: float  # s: 1 sigma of the time of steps in a log's commands
+    held_or_not: float  # s: 1 sigma of a servo's lateness that stems from not knowing whether commands are held
     limits: Array  # (m,) s: 1 sigma of how late the rate limits have made the controls in the flight
     places: Index  # (W,) where the columns of the signal vector stand among them
     reconstructed: tuple[bool, bool] = (False, False)  # whether alpha, beta are, as no vanes measure them
@@ -118,6 +122,7 @@ def imperfections(
         columns,
         math.hypot(unseen, *(aircraft.tolerances.get(f"delays.{topic}", 0.0) for topic in ("actuators", "imu"))),
         unseen,
+        0.0 if commanded or positions else HELD_OR_NOT,
         np.zeros(len(controls)),
         np.array([columns.place(i) for i in range(layout.width)], np.intp),
         reconstructed,

@@ -127,30 +127,37 @@ def _mean_alpha(changes: ColumnChanges, name: str, key: str) -> None:
 
 
 def _air_data_late(changes: ColumnChanges, name: str, key: str) -> None:
+    _air_data_later(changes, 1.0)
+
+
+def _air_data_later(changes: ColumnChanges, by: float) -> None:
     """The rates of what the probe measures: of the flow at the CG, and of its difference from the flow at the probe."""
     for angle in ("alpha", "beta"):
-        changes.by_vane(angle)({angle: (0.0, 1.0)}, 0.0)
-    changes.airspeed_varies({"0": (0.0, 0.5)})  # k goes with the airspeed's square
+        changes.by_vane(angle)({angle: (0.0, by)}, 0.0)
+    changes.airspeed_varies({"0": (0.0, 0.5 * by)})  # k goes with the airspeed's square
     for along, arm in enumerate(changes.aircraft.sensors.air_data):
         for change, rate, share in _probe_flow(changes, along):
             # the flow at the CG is that at the probe and what a longer arm adds
-            change({rate: (0.0, -arm * share)}, 0.0)
+            change({rate: (0.0, -by * arm * share)}, 0.0)
 
 
 def _imu_late(changes: ColumnChanges, name: str, key: str) -> None:
-    for rate in RATES:
-        changes.rate(rate, rate, 0.0, delay=1.0)
-    for moment in _MOMENTS:
-        changes.add(moment, {moment: (0.0, 1.0), "0": (0.0, changes.means.of(moment))})
-    for axis, (terms, mean) in changes.forces().items():
-        changes.force(axis, {n: (0.0, a) for n, (a, _) in terms.items()} | {"0": (0.0, mean)})
-    for angle in ("alpha", "beta"):
-        changes.by_integration(angle)({angle: (0.0, 1.0)}, 0.0)
+    """Only the times between topics matter, so that a late IMU is the same as early air data and actuators.
+
+    Its own columns are products, k p for example, of which it makes one factor late. Were they moved as a whole, the
+    difference, the rate of k times p, would be the only part of the change that nothing else can make up for.
+    """
+    _air_data_later(changes, -1.0)
+    _actuators_later(changes, -1.0)
 
 
 def _actuators_late(changes: ColumnChanges, name: str, key: str) -> None:
+    _actuators_later(changes, 1.0)
+
+
+def _actuators_later(changes: ColumnChanges, by: float) -> None:
     for control in changes.layout.timed:
-        changes.add(control, {control: (0.0, 1.0)})
+        changes.add(control, {control: (0.0, by)})
 
 
 def _imu_scale(changes: ColumnChanges, name: str, key: str) -> None:

@@ -37,7 +37,7 @@ def test_more_flights_tell_more_but_not_of_what_they_share():
     stamps, area = keys.index("delays.actuators"), keys.index("geometry.S")
     # one flight may already tell all that the stamps, which do not average out, leave to be told
     assert four.errors[servos].max() < one.errors[servos].max()
-    assert (four.errors[servos] < 1.01 * one.errors[servos]).all()
+    assert (four.errors[servos] < 1.03 * one.errors[servos]).all()
     assert (four.errors[servos] > 0.9 * four.errors[stamps]).all()
     # no flight tells of the area, whose tolerance counts once
     assert four.errors[area] > 0.99 * UNCERTAIN.tolerances["geometry.S"]

@@ -15,6 +15,7 @@ from sysid_node.batch.systematic.flight_posterior import flight_posterior
 from sysid_node.batch.systematic.online_passes import OnlineEstimate, online_passes
 from sysid_node.batch.systematic.systematic_errors import with_systematic_errors
 from sysid_node.flight.logs.tables import with_commands
+from sysid_node.online.systematic.imperfections import HELD_OR_NOT
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +27,15 @@ def test_servos_that_the_file_does_not_know(found):
     for name, servo in found.systematic.servos.items():
         assert servo.valid, name
         assert abs(servo.value - LATE) < 3.0 * servo.standard_error, name
+
+
+def test_servos_may_be_later_where_nothing_says_whether_commands_were_held(found):
+    """The flights' own part is the same where commands are stated; what holding may add is in quadrature with it."""
+    records = [with_commands(UNCERTAIN, behind_servos(seed), "commands") for seed in (1, 2)]
+    stated = identify("equation_error", UNCERTAIN, records, BatchSettings(actuators="commands")).fit.systematic.servos
+    for name, servo in found.systematic.servos.items():
+        whole = np.hypot(stated[name].standard_error, HELD_OR_NOT)
+        assert servo.standard_error == pytest.approx(whole, rel=0.05), name
 
 
 def test_intervals_hold_the_truth(found):

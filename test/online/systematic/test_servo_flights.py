@@ -4,7 +4,9 @@
 noise, or the dynamic pressure's rate, is taken for the servo's, elevator and damping exchange their times.
 """
 
+import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.online.alignment.in_pieces import align_streams
 from sysid_node.online.replay import run
 from sysid_node.online.settings import OnlineSettings
+from sysid_node.online.systematic.budget import Budget
 from sysid_node.online.types import Estimates
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.recording import FlightSampler
@@ -23,6 +26,7 @@ LATE = 0.05  # s, of first order; the aircraft file does not say so
 KESTREL = load_aircraft("kestrel")
 
 
+@cache
 def estimated(noise: float, method: str, seed: int) -> Estimates:
     """The estimates at the end of three 3-2-1-1s on each surface, with so many times the file's noise."""
     simulator = Simulator(KESTREL, 400.0)
@@ -44,6 +48,19 @@ def test_with_little_noise_servos_and_derivatives_are_those_flown() -> None:
     for name in ("CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da"):
         truth = KESTREL.derivatives[name].value
         assert found.derivatives[name].value == pytest.approx(truth, rel=0.15), name
+
+
+def test_a_flight_does_not_tell_how_late_the_imu_is() -> None:
+    """A late IMU is the same as early air data and faster servos, of which the file says little.
+
+    Truth: the tolerance's standard deviation, of a normal distribution cut off below zero. The airspeed changes by a
+    fifth, and what it multiplies must not seem to tell more, however little noise there is.
+    """
+    budget = estimated(0.1, "iv_rft", 1).budget
+    assert isinstance(budget, Budget)
+    place = budget.sources.index("delays.imu")
+    believed = KESTREL.tolerances["delays.imu"] * math.sqrt(1.0 - 2.0 / math.pi)
+    assert math.sqrt(budget.covariance[place, place]) == pytest.approx(believed, rel=0.1)
 
 
 def test_with_the_usual_noise_intervals_hold() -> None:
