@@ -12,8 +12,9 @@ terms are much larger than their sum, so that an error of one of them shows in i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,14 @@ def flight_means(layout: SignalLayout, integrals: Array) -> FlightMeans:
     names = layout.names[: layout.transformed]
     shares = integrals[: layout.transformed] / max(weight, 1e-12)
     return FlightMeans(max(weight / max(time, 1e-12), 1e-3), dict(zip(names, shares.tolist(), strict=True)))
+
+
+class ProbeFlow(NamedTuple):
+    """What the probe's arm brings to the flow at the CG."""
+
+    of: str  # alpha, beta or V
+    rate: str  # that turns the arm
+    share: float  # rad, or share of the airspeed times the mean k, per m of the arm and unit of the rate's column
 
 
 @dataclass
@@ -230,17 +239,45 @@ class ColumnChanges:
         self.shift("CL", lift * mean)
         self.shift("CD", drag * mean)
 
-    def rate(self, target: str, source: str, share: float, delay: float = 0.0) -> None:
-        """Change an angular rate by a ``share`` of another, or of its own rate of change times ``delay`` (s).
+    def probe_flow(self, along: int) -> Iterator[ProbeFlow]:
+        """What each m of the probe's arm ``along`` an axis (0 to 2) brings to the flow at the CG, by which rate."""
+        for target, turning, sign in (((along + 1) % 3, (along + 2) % 3, -1.0), ((along + 2) % 3, (along + 1) % 3, 1.0)):
+            rate = RATES[turning]
+            share = sign * self.per_column(rate) * self.means.k / self.airspeed
+            if target == 1:
+                yield ProbeFlow("beta", rate, share)
+                continue
+            across, forward = (self._cos, self._sin) if target == 2 else (-self._sin, self._cos)
+            yield ProbeFlow("alpha", rate, across * share)
+            yield ProbeFlow("V", rate, forward * share)
 
-        It changes its regressor, and all coefficients by its angular acceleration.
+    def flow_at_cg(self, flow: ProbeFlow, factor: float, source: str = "", rate: float = 0.0) -> None:
+        """Change the flow at the CG by ``factor`` times a part of it that the probe's arm brings.
+
+        It is made of the rate of the ``flow``, or of another ``source``; ``rate`` is the same of its rate (s).
+        """
+        name = source or flow.rate
+        ratio = self.per_column(name) / self.per_column(flow.rate)
+        terms = {name: (factor * flow.share * ratio, rate * flow.share * ratio)}
+        if flow.of == "V":
+            self.airspeed_varies(terms)
+        else:
+            self.by_vane(flow.of)(terms, factor * flow.share * ratio * self.means.of(name))
+
+    def rate(self, target: str, source: str, share: float) -> None:
+        """Change an angular rate by a ``share`` of another, or of its own.
+
+        It changes its regressor, the flow at the CG by the probe's arms, and all coefficients by its angular
+        acceleration.
         """
         per_column = self.per_column(source)
         ratio = per_column / self.per_column(target)
-        self.add(target, {source: (share * ratio, delay * ratio)})
+        self.add(target, {source: (share * ratio, 0.0)})
         self.shift(target, share * ratio * self.means.of(source))
-        if delay:
-            return
+        for along, arm in enumerate(self.aircraft.sensors.air_data):
+            for flow in self.probe_flow(along):
+                if flow.rate == target:
+                    self.flow_at_cg(flow, arm * share, source)
         for name, momentum in self._momentum[target].items():
             terms = {source: (0.0, share * momentum * per_column)}
             if name in FORCES:

@@ -7,7 +7,7 @@ adds to, of the last part of its tolerance's key, and of the whole key.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from sysid_node.online.systematic.column_changes import AXES, FORCES, RATES, ColumnChanges, Terms
 
@@ -109,10 +109,21 @@ def _airspeed(changes: ColumnChanges, share: float) -> None:
     for axis, (terms, _) in changes.forces().items():  # the flow turns by the accelerations over the airspeed
         changes.angles_by_force(axis, {n: (-share * a, 0.0) for n, (a, _) in terms.items()})
     changes.angles_by_rate("p", "p", -share)
+    _angles_by_arms(changes, ("alpha", "beta"), -share)
 
 
 def _vane_scale(changes: ColumnChanges, name: str, key: str) -> None:
+    """A vane's scale is that of the flow at the probe, which is that at the CG less what the arms bring."""
     changes.by_vane(name)({name: (-1.0, 0.0)}, -changes.means.of(name))
+    _angles_by_arms(changes, (name,), 1.0)
+
+
+def _angles_by_arms(changes: ColumnChanges, angles: Sequence[str], factor: float) -> None:
+    """Change flow angles at the CG by ``factor`` times what the probe's arms bring to them."""
+    for along, arm in enumerate(changes.aircraft.sensors.air_data):
+        for flow in changes.probe_flow(along):
+            if flow.of in angles:
+                changes.flow_at_cg(flow, factor * arm)
 
 
 def _vane_bias(changes: ColumnChanges, name: str, key: str) -> None:
@@ -136,9 +147,9 @@ def _air_data_later(changes: ColumnChanges, by: float) -> None:
         changes.by_vane(angle)({angle: (0.0, by)}, 0.0)
     changes.airspeed_varies({"0": (0.0, 0.5 * by)})  # k goes with the airspeed's square
     for along, arm in enumerate(changes.aircraft.sensors.air_data):
-        for change, rate, share in _probe_flow(changes, along):
-            # the flow at the CG is that at the probe and what a longer arm adds
-            change({rate: (0.0, -by * arm * share)}, 0.0)
+        for flow in changes.probe_flow(along):
+            # the flow at the CG is that at the probe and what the arm brings, which is not late
+            changes.flow_at_cg(flow, 0.0, rate=-by * arm)
 
 
 def _imu_late(changes: ColumnChanges, name: str, key: str) -> None:
@@ -229,28 +240,8 @@ def _probe_place(changes: ColumnChanges, name: str, key: str) -> None:
 
 def _probe_moved(changes: ColumnChanges, name: str, by: float) -> None:
     """The probe's arm is longer: the flow at the CG is that at the probe less rates x arm."""
-    for change, rate, share in _probe_flow(changes, AXES.index(name)):
-        change({rate: (by * share, 0.0)}, by * share * changes.means.of(rate))
-
-
-def _probe_flow(changes: ColumnChanges, along: int) -> list[tuple[Callable[[Terms, float], None], str, float]]:
-    """What each m of the probe's arm ``along`` an axis changes of the flow at the CG, by which rate's column."""
-    cos, sin = math.cos(changes.means.of("alpha")), math.sin(changes.means.of("alpha"))
-    found: list[tuple[Callable[[Terms, float], None], str, float]] = []
-    for target, turning, sign in (((along + 1) % 3, (along + 2) % 3, -1.0), ((along + 2) % 3, (along + 1) % 3, 1.0)):
-        rate = RATES[turning]
-        share = sign * changes.per_column(rate) * changes.means.k / changes.airspeed
-        if target == 1:
-            found.append((changes.by_vane("beta"), rate, share))
-            continue
-        across, forward = (cos, sin) if target == 2 else (-sin, cos)
-        found.append((changes.by_vane("alpha"), rate, across * share))
-        found.append((_airspeed_by(changes), rate, forward * share))
-    return found
-
-
-def _airspeed_by(changes: ColumnChanges) -> Callable[[Terms, float], None]:
-    return lambda terms, mean: changes.airspeed_varies(terms)
+    for flow in changes.probe_flow(AXES.index(name)):
+        changes.flow_at_cg(flow, by)
 
 
 def _cg(changes: ColumnChanges, name: str, key: str) -> None:

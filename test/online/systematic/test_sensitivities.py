@@ -138,6 +138,28 @@ def at_a_probe(samples: np.ndarray, arm: float) -> np.ndarray:
     return found
 
 
+@pytest.mark.parametrize("key", ["airspeed_scale.error", "vane_scale.alpha", "imu_scale.q"])
+def test_scales_are_those_of_what_is_read_at_the_probe(key):
+    """The flow at the CG is the probe's, which the vane scales, less rates x arm over the airspeed, which it does not.
+
+    Truth: finite differences of the whole estimator.
+    """
+    arm, (step, change) = 2.0, CASES[key]
+    exact, samples = replace(EXACT, sensors=Sensors(air_data=(arm, 0.0, 0.0))), at_a_probe(flown()[1], arm)
+    state = identified(replace(exact, stated_tolerances={key: step}), samples)
+    assert state.latest is not None and state.latest.systematic is not None
+    jacobian = state.latest.systematic.considered.jacobian[0].reshape(-1)[state.model.table.place]
+    ends = []
+    for by in (-step, step):
+        changed = samples.copy()
+        change(changed, by)
+        ends.append(slopes_and_offsets(identified(exact, changed)))
+    difference = (ends[1] - ends[0]) / (2.0 * step)
+    slopes = [not name.endswith("_0") for name in EXACT.derivatives]
+    size = 0.01 * np.abs(difference).max()
+    assert np.all(np.abs(jacobian - difference)[slopes] < (0.05 * np.abs(difference) + size)[slopes])
+
+
 def test_late_air_data_are_those_of_the_probe():
     """Air data that are read later, at the probe and not at the CG, where the aircraft's rates are not in them."""
     arm, step = 0.5, 1e-3
