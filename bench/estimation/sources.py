@@ -87,7 +87,8 @@ def _truth(key: str, effects: Effects) -> float | None:
 def _table(found: Mapping[str, Rows]) -> str:
     keys = [key for key in next(iter(found.values())) if min(_left(rows[key]) for rows in found.values()) < TOLD]
     heads = ["imperfection", *(f"{name}: {word}" for name in found for word in ("left", "error, rms", "hold"))]
-    return table(heads, [[f"`{key}`", *(cell for rows in found.values() for cell in _cells(rows[key]))] for key in keys])
+    body = [[f"`{key}`", *(cell for rows in found.values() for cell in _cells(rows[key]))] for key in keys]
+    return table(heads, body)
 
 
 def _left(rows: list[tuple[float, float]]) -> float:

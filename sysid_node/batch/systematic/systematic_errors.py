@@ -101,9 +101,9 @@ def servos(posterior: FlightPosterior) -> dict[str, ParameterEstimate]:
     """
     rows: dict[str, ParameterEstimate] = {}
     found = zip(posterior.imperfections, posterior.mean.tolist(), posterior.errors.tolist(), strict=True)
-    for one, value, error in sorted(found, key=lambda item: item[0].commanded):
+    for one, value, alone in sorted(found, key=lambda item: item[0].commanded):
         if one.role == "lateness":
-            error = error if one.commanded else math.hypot(error, HELD_OR_NOT)
+            error = alone if one.commanded else math.hypot(alone, HELD_OR_NOT)
             lower, upper = confidence_interval(value, error, np.inf)
             valid = error <= SERVO_KNOWN
             status = "ok" if valid else "converging"

@@ -240,8 +240,9 @@ class ColumnChanges:
         self.shift("CD", drag * mean)
 
     def probe_flow(self, along: int) -> Iterator[ProbeFlow]:
-        """What each m of the probe's arm ``along`` an axis (0 to 2) brings to the flow at the CG, by which rate."""
-        for target, turning, sign in (((along + 1) % 3, (along + 2) % 3, -1.0), ((along + 2) % 3, (along + 1) % 3, 1.0)):
+        """What each m of the probe's arm ``along`` an axis (0 to 2) brings to the flow at the CG, by rates."""
+        one, other = (along + 1) % 3, (along + 2) % 3
+        for target, turning, sign in ((one, other, -1.0), (other, one, 1.0)):
             rate = RATES[turning]
             share = sign * self.per_column(rate) * self.means.k / self.airspeed
             if target == 1:

@@ -38,8 +38,9 @@ OF_ONE_TYPE = 0.8
 COMPLETE = 0.02 / 0.93
 #: The largest root of a correlation by a shared damping: that of one would have no inverse.
 ALIKE = 0.99
-#: Where messages may be positions or commands: 1 sigma of the lateness (s) that this leaves open. Held commands are half
-#: an interval later than the lines between them, at most 0.01 s at 50 Hz: a rectangular distribution (GUM, sec. 4.3.7).
+#: Where messages may be positions or commands: 1 sigma of the lateness (s) that this leaves open. Held commands are
+#: half an interval later than the lines between them, at most 0.01 s at 50 Hz: a rectangular distribution (GUM, sec.
+#: 4.3.7).
 HELD_OR_NOT = 0.01 / math.sqrt(3.0)
 SMALLEST = 1e-4  # s: 1 sigma of a servo of which only the rate limit is not exactly known
 KNOWN = 0.03  # s: the largest 1 sigma of a servo of which something is known
