@@ -31,8 +31,9 @@ CURVATURE = 0.25
 #: Share of L^3 by which the third coefficient of a servo lies beside what L and B say of it: lags of first and second
 #: order with delays of up to all of L.
 THIRD = 0.05
-#: Correlation of the lateness of two servos of which the file is silent: an aircraft has servos of one type, and what
-#: their linkages, loads and makes add to one of 50 ms is under half of it.
+#: Correlation of the lateness of two servos of which nothing is known: an aircraft has servos of one type, and what
+#: their linkages, loads and makes add to one of 50 ms is under half of it. Where messages may be positions as well as
+#: commands, either all controls have servos after them or none has.
 OF_ONE_TYPE = 0.8
 #: The longest interval (s) between a log's commands of which nothing more is unknown: 50 Hz, whose stamps scatter.
 COMPLETE = 0.02 / 0.93
@@ -57,7 +58,7 @@ class Imperfections:
     applied: ServoModel  # of all controls: what the alignment has made of commands already, by the aircraft file
     expected: Array  # (m,) s: the lateness that is expected beyond the aircraft file's
     sigmas: Array  # (m,) s: 1 sigma of the lateness about that
-    unknown: Index  # places among the m of the servos of which the file is silent
+    unknown: Index  # places among the m of the servos of which nothing is known, see ``_UncertainServo``
     precision: Array  # (K, K) inverse of the correlations before the flight
     columns: ServoColumns
     stamps: float  # s: 1 sigma of the lateness of the stamps of controls and motion, against each other
@@ -108,8 +109,8 @@ def imperfections(
     if not found and not rows:
         return None
     columns = ServoColumns.of(layout, integrals=any(reconstructed))
-    controls, timed, expected, sigmas, damped, silent = zip(*rows, strict=True) if rows else ((),) * 6
-    unknown = np.flatnonzero(silent)
+    controls, timed, expected, sigmas, damped, of_unknown = zip(*rows, strict=True) if rows else ((),) * 6
+    unknown = np.flatnonzero(of_unknown)
     applied = np.array(stated).reshape(-1, 3) if commanded else np.zeros((len(layout.timed), 3))
     return Imperfections(
         found,
@@ -138,7 +139,7 @@ class _UncertainServo(NamedTuple):
     expected: float  # s: lateness beyond the file's
     sigma: float  # s: its 1 sigma about that
     damped: float  # share of the 1 sigma that it has by the damping, which all controls share
-    silent: bool  # whether the file says nothing of it
+    unknown: bool  # whether the file says nothing of it, or what it says may not concern what is recorded
 
 
 def _uncertain_servos(
@@ -160,9 +161,9 @@ def _uncertain_servos(
             sigma = max(sigma, SMALLEST)  # the flight may make it later by a limit that is not exactly known
         whole = math.hypot(sigma, unseen)
         if whole > 0.0:
-            silent = stated == 0.0 and sigma > KNOWN
+            unknown = (stated == 0.0 or not commanded) and sigma > KNOWN
             mean, spread = _later(stated, sigma) if commanded else (0.0, sigma)
-            rows.append(_UncertainServo(name, place, mean, math.hypot(spread, unseen), damped / whole, silent))
+            rows.append(_UncertainServo(name, place, mean, math.hypot(spread, unseen), damped / whole, unknown))
     return rows
 
 

@@ -64,11 +64,17 @@ def test_servos_that_only_their_damping_leaves_open_move_together():
     assert correlation[0, 1] == pytest.approx(0.99**2)
 
 
-def test_servos_of_which_the_file_is_silent_are_alike():
-    """In lateness, curvature and third coefficient; an aircraft has servos of one type."""
-    aircraft = replace(made_aircraft(), ideal=False)
-    found = imperfections(aircraft, layout(aircraft), commanded=True, positions=False)
+@pytest.mark.parametrize("stated", [False, True])
+def test_servos_of_which_nothing_is_known_are_alike(stated):
+    """In lateness, curvature and third coefficient; an aircraft has servos of one type.
+
+    What a file states of them does not tell whether they come after messages that may be positions or commands.
+    """
+    lags = {"actuator_lag": dict.fromkeys(CONTROLS, UncertainValue(0.05, 0.01))} if stated else {}
+    aircraft = replace(made_aircraft(), ideal=False, effects=lags)
+    found = imperfections(aircraft, layout(aircraft), commanded=not stated, positions=False)
     assert found is not None
+    np.testing.assert_array_equal(found.unknown, range(3))
     correlation, first = np.linalg.inv(found.precision), found.servos.start
     for order in range(3):
         block = slice(first + 3 * order, first + 3 * order + 3)
