@@ -1,4 +1,4 @@
-"""Servos of which the aircraft file is silent: other solutions are tried, and the more probable one is taken.
+"""Servos of which nothing is known before the flight: other solutions are tried, and the more probable one is taken.
 
 The fit has two minima where a motion is about as slow as a servo may be. A slow aileron of an aircraft that rolls at
 once answers as a fast aileron does of one that takes as long to roll: roll mode and servo exchange their time
