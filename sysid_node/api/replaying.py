@@ -37,6 +37,7 @@ from sysid_node.online.alignment.in_pieces import AlignedSamples, PieceAlignment
 from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_covariance
 from sysid_node.online.estimates.log import EstimatesLog
 from sysid_node.online.estimates.published import estimate
+from sysid_node.online.estimates.servo_gap import surely_late
 from sysid_node.online.settings import FIRST_ESTIMATE, OnlineSettings, too_short_to_replay
 from sysid_node.online.types import AZ, LIFT, Estimates, controls_in
 from sysid_node.report.files.outputs.output_folder import output_folder
@@ -89,7 +90,8 @@ class Replay(EstimatedRun):
         # While the estimator settles nothing is included yet, and estimates have the same time.
         shown = {estimates.time: estimates for estimates in (*self.history[every - 1 :: every], self.final)}
         commanded = math.isfinite(self.commands_from)
-        said = (carried_in_words(self.aircraft, self.settings.actuators, commanded), not_taken_in_words(self.aircraft))
+        carried = carried_in_words(self.aircraft, self.settings.actuators, commanded, surely_late(self.final.servos))
+        said = (carried, not_taken_in_words(self.aircraft))
         result = replay_result(
             self.aircraft,
             self.settings,

@@ -117,22 +117,27 @@ def commands_of(aircraft: Aircraft, carried: str, *, servos: bool = True) -> Rec
     return RecordedCommands(models, is_commanded, (-1, 0) if is_commanded else None)
 
 
-def carried_in_words(aircraft: Aircraft, setting: str, commanded: bool) -> str:
-    """A sentence for the reader: what the topic carries, how that is known, and what follows."""
+def carried_in_words(aircraft: Aircraft, setting: str, commanded: bool, late: Sequence[str] = ()) -> str:
+    """A sentence for the reader: what the topic carries, how that is known, and what follows.
+
+    ``late``: controls that surely act later than they are recorded.
+    """
     how = " (inferred from the messages)" if setting == "auto" else ""
     if commanded:
         return f"Actuators carry commands{how}; {in_words(aircraft)}."
     if setting == "auto":
         taken = "Actuators are taken as positions: no command jumps that a surface could not follow."
+        if late:
+            return f"{taken} But {', '.join(late)} act later than recorded, as after commands: {_STATE}"
         return f"{taken} {_UNSAID}" if aircraft.ideal else taken
     return ""
 
 
+#: What users are asked for where messages do not show what they are.
+_STATE = "state what they carry (actuators: positions or commands)."
+
 #: Smooth commands look like positions, and an ideal aircraft has no tolerance for the difference.
-_UNSAID = (
-    "The aircraft file is ideal, so the intervals hold only if they are: state what they carry "
-    "(actuators: positions or commands)."
-)
+_UNSAID = f"The aircraft file is ideal, so the intervals hold only if they are: {_STATE}"
 
 
 def take_command(state: RecordedCommands, epoch: int, stamp: int, values: Sequence[float]) -> None:

@@ -20,7 +20,7 @@ from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_
 from sysid_node.online.estimates.current_solution import CurrentSolution, current_solution
 from sysid_node.online.estimates.model_gap import CoefficientGap, model_gap
 from sysid_node.online.estimates.published import estimate_of
-from sysid_node.online.estimates.servo_gap import ServoGap, servo_gaps, servo_times_in_file
+from sysid_node.online.estimates.servo_gap import ServoGap, servo_gaps, servo_times_in_file, surely_late
 from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import LIFT, Estimates, controls_in
 
@@ -66,10 +66,13 @@ class Session:
         """Whether the estimates take the deflections from commands, and not from measured positions."""
         return self.state.model.sample.commanded
 
-    @property
-    def carried(self) -> str:
-        """What the actuators' messages are taken for, in words; empty where the user said that they are positions."""
-        return carried_in_words(self.aircraft, self.settings.actuators, self.commanded)
+    def carried(self, estimates: Estimates | None = None) -> str:
+        """What the actuators' messages are taken for, in words; empty where the user said that they are positions.
+
+        ``estimates`` may tell that these act later than they are recorded.
+        """
+        late = surely_late(estimates.servos) if estimates else ()
+        return carried_in_words(self.aircraft, self.settings.actuators, self.commanded, late)
 
     @property
     def rejected(self) -> dict[str, int]:

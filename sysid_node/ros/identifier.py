@@ -253,8 +253,8 @@ class Identifier(CarefulNode):
         if not session.samples:
             message.status += [source.waits("estimate"), source.waits("computation")]
             return
-        self._say_what_actuators_carry(session)
         due = due or session.now(session.silence)
+        self._say_what_actuators_carry(session.carried(due.estimates))
         silence = session.silence if session.silence > stale_after else 0.0
         if silence:
             lag = self._lag
@@ -265,11 +265,11 @@ class Identifier(CarefulNode):
         work = {"update": session.update_times, "publication": self._publish_times}
         message.status.append(source.computation(work, self._lag, silence))
 
-    def _say_what_actuators_carry(self, session: Session) -> None:
+    def _say_what_actuators_carry(self, carried: str) -> None:
         """Say in the log what the actuators' messages are taken for, once, and again where that has changed."""
-        if session.carried != self._carried:
-            self._carried = session.carried
-            self.get_logger().info(session.carried or "Actuators carry positions.")
+        if carried != self._carried:
+            self._carried = carried
+            self.get_logger().info(carried or "Actuators carry positions.")
 
     def _warn(self, session: Session, monitors: Sequence[TopicMonitor], recent: Sequence[RecentTopic]) -> None:
         """Say in the log which inputs are silent, rejected or late."""

@@ -68,6 +68,14 @@ def test_an_ideal_file_wants_to_be_told_what_smooth_messages_are():
     assert carried_in_words(ideal, "positions", commanded=False) == ""
 
 
+def test_surfaces_that_act_late_are_said_where_nobody_said_what_is_recorded():
+    aircraft, late = load_aircraft("cdrw"), ["elevator", "rudder"]
+    said = carried_in_words(aircraft, "auto", commanded=False, late=late)
+    assert "elevator, rudder act later than recorded, as after commands" in said
+    assert "later than" not in carried_in_words(aircraft, "auto", commanded=True, late=late)
+    assert carried_in_words(aircraft, "positions", commanded=False, late=late) == ""
+
+
 def test_message_by_message_the_same():
     stamps, commands = steps(100.0, noise=2e-3)
     counter, found = JumpCounter(), []

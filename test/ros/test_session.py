@@ -105,14 +105,14 @@ def test_what_actuators_are_taken_for_follows_the_messages() -> None:
     jumps = 0.1 * ((np.arange(200) // 20) % 2)
     flight.actuators.positions[100:, :3] = jumps[100:, np.newaxis]
     assert not session.commanded
-    assert session.carried.startswith("Actuators are taken as positions")
+    assert session.carried().startswith("Actuators are taken as positions")
     fly(session, flight, "iaj")
     assert session.commanded
-    assert session.carried.startswith("Actuators carry commands (inferred from the messages)")
+    assert session.carried().startswith("Actuators carry commands (inferred from the messages)")
     session.reset()
     assert not session.commanded
     stated = Session(load_aircraft("cdrw"), OnlineSettings(actuators="positions"), 10.0)
-    assert (stated.commanded, stated.carried) == (False, "")
+    assert (stated.commanded, stated.carried()) == (False, "")
 
 
 @pytest.mark.parametrize(("scale", "said"), [(1.0, False), (3.6, True)])

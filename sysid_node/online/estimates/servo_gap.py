@@ -11,6 +11,9 @@ from sysid_node.flight.servos import servos_of
 from sysid_node.online.systematic.servo_model import of_servo
 from sysid_node.online.types import DerivativeEstimate
 
+#: Standard errors by which a control acts later than recorded where it surely does.
+SURELY = 3.0
+
 
 class ServoGap(NamedTuple):
     """One control's servo: lag and delay together, s."""
@@ -34,3 +37,8 @@ def servo_gaps(in_file: Mapping[str, float], servos: Mapping[str, DerivativeEsti
     return [
         ServoGap(name, d.value, d.standard_error, in_file.get(name, math.nan)) for name, d in servos.items() if d.valid
     ]
+
+
+def surely_late(servos: Mapping[str, DerivativeEstimate]) -> list[str]:
+    """The controls that surely act later than what is recorded of them, as they do after commands."""
+    return [name for name, d in servos.items() if d.valid and d.value > SURELY * d.standard_error]

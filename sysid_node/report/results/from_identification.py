@@ -17,6 +17,7 @@ from sysid_node.batch.settings import BatchSettings
 from sysid_node.faults.recorded_rate_limits import rate_limits_of
 from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.record import FlightRecord
+from sysid_node.online.estimates.servo_gap import surely_late
 from sysid_node.online.types import DerivativeEstimate, Estimates, FitQuality
 from sysid_node.report.drawing.spectrum import amplitude_spectrum
 from sysid_node.report.results.run_result import References, RunData, RunResult, prior_of
@@ -37,12 +38,12 @@ def identification_result(
     """The result of a batch method as the reports take it. ``records`` are the flights that were fitted."""
     fit, first = found.fit, records[0]
     commanded = any(record.commanded for record in records)
-    carried = carried_in_words(aircraft, settings.actuators, commanded)
     trusted = "ok" if fit.search.converged else "not converged"
     derivatives = {
         name: _derivative(name, fit.estimates.get(name), trusted, fit.remarks) for name in aircraft.derivatives
     }
     servos = {name: _derivative(name, estimate, "ok", ()) for name, estimate in fit.systematic.servos.items()}
+    carried = carried_in_words(aircraft, settings.actuators, commanded, surely_late(servos))
     estimates = Estimates(
         sum(record.duration for record in records), derivatives, _fits(found), servos, fit.systematic.budget
     )

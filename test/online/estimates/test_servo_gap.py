@@ -7,7 +7,7 @@ import pytest
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import UncertainValue
-from sysid_node.online.estimates.servo_gap import ServoGap, servo_gaps, servo_times_in_file
+from sysid_node.online.estimates.servo_gap import ServoGap, servo_gaps, servo_times_in_file, surely_late
 from sysid_node.online.types import DerivativeEstimate
 
 
@@ -32,3 +32,13 @@ def test_servos_whose_time_is_known_are_compared() -> None:
     elevator, aileron = servo_gaps({"elevator": 0.03}, estimates | {"rudder": estimated("rudder", False)})
     assert elevator == ServoGap("elevator", 0.038, 0.0015, 0.03)
     assert aileron.control == "aileron" and math.isnan(aileron.in_file)
+
+
+def test_surfaces_that_surely_act_late() -> None:
+    """By hand: more than three standard errors, and valid."""
+    rows = {"elevator": (0.038, 0.012, True), "aileron": (0.03, 0.012, True), "rudder": (0.2, 0.012, False)}
+    estimates = {
+        name: DerivativeEstimate(name, value, error, value - 2.0 * error, value + 2.0 * error, valid, "")
+        for name, (value, error, valid) in rows.items()
+    }
+    assert surely_late(estimates) == ["elevator"]
