@@ -30,6 +30,9 @@ STALE = 0.5  # s without a new sample
 SETTLING = 1.0  # s after an abrupt change in which "changed" is said
 POOR = 0.7  # share of a coefficient's motion left unexplained beyond which no estimate of it is valid
 NARROWEST = 1e-12  # share of an estimate under which its standard error is rounding
+#: A servo's standard error (s), and the share of a slope by which that much of its time changes it, beyond which the
+#: slope's response to it is not linear, as its interval takes it to be.
+VAGUE, MOVED = 0.02, 0.15
 BURIED = 3.0  # times its sensor's noise energy that a regressor must move
 
 
@@ -102,6 +105,7 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     table, words = state.model.table, state.model.vocabulary
     c = table.coefficient
     objections = np.zeros(c.size, np.uint8)
+    objections[_moved_by_servos(state, latest)[c, table.unknown] & ~table.offset] = status.CONVERGING
     lag = latest.tests.lag
     biased = lag.biased[table.unknown, c] & ~table.offset
     objections[biased] = [words.code(f"{lag.lagging_control[i]} not on time") for i in c[biased].tolist()]
@@ -150,6 +154,22 @@ def _ahead_of_commands(state: EstimatorState, latest: SegmentSolution) -> tuple[
     if imperfect is None or found is None:
         return ()
     return tuple(state.model.layout.timed[i] for i in imperfect.timed[found.ahead(imperfect)].tolist())
+
+
+def _moved_by_servos(state: EstimatorState, latest: SegmentSolution) -> Flags:
+    """(C, P + 1) slopes that change by much with the time of a servo that is known poorly.
+
+    Servo and roll mode, say, exchange their times: of a roll damping a servo 60 ms too fast may leave a third.
+    """
+    imperfect, found, theta = state.model.imperfections, latest.systematic, latest.solution.theta.T
+    moved = np.zeros((theta.shape[0], theta.shape[1] + 1), bool)
+    if imperfect is None or found is None:
+        return moved
+    slopes = np.abs(theta + found.correction[:, :-1])
+    for i in np.flatnonzero(found.errors > VAGUE).tolist():
+        by = np.abs(found.considered.jacobian[imperfect.servos.start + i, :, :-1]) * found.errors[i]
+        moved[:, :-1] |= by > MOVED * slopes
+    return moved
 
 
 def judge(state: EstimatorState, latest: SegmentSolution, current: CurrentSolution, now: float) -> Codes:
