@@ -45,10 +45,13 @@ def test_each_log_says_its_day_and_its_aircraft(out: Path) -> None:
 
 
 def test_the_same_flight_gives_the_same_derivatives_from_every_log(out: Path) -> None:
-    """The two autopilots' logs hold the same 20 s of the bag, rounded and sampled differently."""
+    """The two autopilots' logs hold the same 20 s of the bag, rounded and sampled differently.
+
+    Their stamps are rounded differently as well, and the lateness that they show counts as systematic.
+    """
     with (out / "estimates.csv").open() as file:
         rows = {(row["flight"], row["derivative"]): row for row in csv.DictReader(file)}
     for name in ("Cm_alpha", "Cm_de", "Cl_p", "Cl_da"):
         one, two, bag = (rows[flight, name] for flight in ("one.ulg", "two.bin", "12/bag"))
-        assert float(one["value"]) == pytest.approx(float(two["value"]), abs=0.2 * float(one["statistical_error"]))
+        assert float(one["value"]) == pytest.approx(float(two["value"]), abs=0.1 * float(one["standard_error"]))
         assert float(one["value"]) == pytest.approx(float(bag["value"]), abs=float(one["standard_error"]))
