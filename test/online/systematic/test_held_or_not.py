@@ -4,6 +4,7 @@ Truth: a plant whose controls follow the lines between the messages half an inte
 make them, and no servo besides.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +14,10 @@ from plant import fly, made_aircraft, multisteps
 from sysid_node.online import estimator
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.settings import OnlineSettings
-from sysid_node.online.systematic.imperfections import HELD_OR_NOT
 from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
 
 RATE, HALF_INTERVAL = 100.0, 1  # Hz, samples
+HELD_OR_NOT = 0.01 / math.sqrt(3.0)  # s: of a rectangular distribution of half an interval of 50 Hz to both sides
 AIRCRAFT = replace(made_aircraft(), ideal=False)
 SURFACES = ("elevator", "aileron", "rudder")
 
