@@ -246,7 +246,7 @@ def _summary(flight: DemoFlight, final: Estimates) -> str:
     expected = flight.reference.values
     inside = sum(d.lower <= expected[d.name] <= d.upper for d in valid)
     what = "true value" if flight.truth else "aircraft file's value"
-    heard = "from commands" if flight.from_commands else "from measured positions"
+    heard = "from commands" if flight.from_commands else "from actuators taken as positions"
     return (
         f"{len(valid)} of {len(final.derivatives)} derivatives valid after {final.time:.0f} s of flight, {heard}\n"
         f"{inside} of these {len(valid)} intervals contain the {what}"
