@@ -2,10 +2,11 @@
 
     python -m bench.estimation.sources [--flights 24] [--first 9101] [--aircraft cdrw kestrel] [--page FILE]
 
-The flights are those of ``all_imperfections`` in still air, and the estimator has the commands. Of every imperfection
-that has a tolerance the table gives its standard deviation after the flight as a share of that before, and the
-estimate's error in these standard deviations. Where the first is one, the flight tells nothing, and the second is the
-draw itself. Listed are those of which a flight of one of the aircraft tells at least so much as ``TOLD``.
+The flights are those of ``all_imperfections`` in still air, and the estimator has the commands. The table gives the
+standard deviation of each imperfection after the flight as a share of that before, and the estimate's error in the
+standard deviations after it. Where the share is one, the flight tells nothing, and the error is the draw itself. Those
+are listed of which flights of one of the aircraft leave less than ``TOLD``. Mass, inertias and controls are not
+compared, because their draws have other units than their tolerances.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ def _servos(state: EstimatorState, latest: SegmentSolution) -> dict[str, Derivat
     assert found is not None
     late, ahead, rows = found.servos.lateness[imperfect.timed].tolist(), found.ahead(imperfect).tolist(), {}
     objections = state.model.vocabulary.texts(validity_basis(state, latest).servos)
-    # what is late of the log's steps, by a rate limit or by holding counts for the derivatives, and is not the servo's
+    # These delays concern the derivatives as much as the servo's own, and the flight cannot tell them from it.
     apart = imperfect.step_time**2 + imperfect.held_or_not**2 + found.limits**2
     errors = np.sqrt(found.errors**2 + apart).tolist()
     parts = zip(imperfect.controls, late, errors, ahead, objections, strict=True)

@@ -30,9 +30,11 @@ STALE = 0.5  # s without a new sample
 SETTLING = 1.0  # s after an abrupt change in which "changed" is said
 POOR = 0.7  # share of a coefficient's motion left unexplained beyond which no estimate of it is valid
 NARROWEST = 1e-12  # share of an estimate under which its standard error is rounding
-#: A servo's standard error (s), and the share of a slope by which that much of its time changes it, beyond which the
-#: slope's response to it is not linear, as its interval takes it to be.
-VAGUE, MOVED = 0.02, 0.15
+#: A servo is known poorly from this standard error of its lateness on, s.
+POORLY_KNOWN = 0.02
+#: Share of its value by which such a standard error may change a slope. Beyond it the change is not linear in the
+#: lateness, as the slope's interval takes it to be.
+LARGEST_CHANGE = 0.15
 BURIED = 3.0  # times its sensor's noise energy that a regressor must move
 
 
@@ -157,18 +159,19 @@ def _ahead_of_commands(state: EstimatorState, latest: SegmentSolution) -> tuple[
 
 
 def _moved_by_servos(state: EstimatorState, latest: SegmentSolution) -> Flags:
-    """(C, P + 1) slopes that change by much with the time of a servo that is known poorly.
+    """(C, P + 1) the slopes that a poorly known servo changes by more than ``LARGEST_CHANGE``.
 
-    Servo and roll mode, say, exchange their times: of a roll damping a servo 60 ms too fast may leave a third.
+    A servo and the roll mode, for example, may exchange their time constants. With an aileron's servo that seemed 90 ms
+    faster than it was, the roll damping came out at a quarter of its value.
     """
     imperfect, found, theta = state.model.imperfections, latest.systematic, latest.solution.theta.T
     moved = np.zeros((theta.shape[0], theta.shape[1] + 1), bool)
     if imperfect is None or found is None:
         return moved
     slopes = np.abs(theta + found.correction[:, :-1])
-    for i in np.flatnonzero(found.errors > VAGUE).tolist():
+    for i in np.flatnonzero(found.errors > POORLY_KNOWN).tolist():
         by = np.abs(found.considered.jacobian[imperfect.servos.start + i, :, :-1]) * found.errors[i]
-        moved[:, :-1] |= by > MOVED * slopes
+        moved[:, :-1] |= by > LARGEST_CHANGE * slopes
     return moved
 
 

@@ -271,8 +271,7 @@ class ColumnChanges:
         It changes its regressor, the flow at the CG by the probe's arms, and all coefficients by its angular
         acceleration.
         """
-        per_column = self.per_column(source)
-        ratio = per_column / self.per_column(target)
+        ratio = self.per_column(source) / self.per_column(target)
         self.add(target, {source: (share * ratio, 0.0)})
         self.shift(target, share * ratio * self.means.of(source))
         for along, arm in enumerate(self.aircraft.sensors.air_data):
@@ -280,11 +279,7 @@ class ColumnChanges:
                 if flow.rate == target:
                     self.flow_at_cg(flow, arm * share, source)
         for name, momentum in self._momentum[target].items():
-            terms = {source: (0.0, share * momentum * per_column)}
-            if name in FORCES:
-                self.force(name, terms)
-            else:
-                self.add(name, terms)
+            self.acceleration(name, source, share * momentum)
 
     def acceleration(self, coefficient: str, rate: str, factor: float) -> None:
         """Change a coefficient by ``factor`` times an angular acceleration (rad/s^2)."""
