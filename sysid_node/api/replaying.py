@@ -23,23 +23,21 @@ from sysid_node.faults.settings import FaultMonitorSettings as FaultSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import counts_by_reason, joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.commanded import carried_in_words
-from sysid_node.flight.live.deflections import DeflectionLimits
-from sysid_node.flight.live.mean_force import MeanForce
-from sysid_node.flight.live.mean_lift import MeanLift
 from sysid_node.flight.logs.opening import carried_by
 from sysid_node.flight.pieces import PIECE, FlightPiece, FlightPieces, flight_pieces
 from sysid_node.flight.record import Array
-from sysid_node.flight.streams import ImuStream, Stamps, Streams
+from sysid_node.flight.streams import Stamps
 from sysid_node.flight.truth import Truth, truth_at_end
 from sysid_node.online import estimator
 from sysid_node.online.alignment import flow_angle_filter, schedule
+from sysid_node.online.alignment.flight_checks import FlightChecks
 from sysid_node.online.alignment.in_pieces import AlignedSamples, PieceAlignment
 from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_covariance
 from sysid_node.online.estimates.log import EstimatesLog
 from sysid_node.online.estimates.published import estimate
 from sysid_node.online.estimates.servo_gap import surely_late
 from sysid_node.online.settings import FIRST_ESTIMATE, OnlineSettings, too_short_to_replay
-from sysid_node.online.types import AZ, LIFT, Estimates, controls_in
+from sysid_node.online.types import Estimates
 from sysid_node.report.files.outputs.output_folder import output_folder
 from sysid_node.report.files.runs.estimates_bag import write_estimates
 from sysid_node.report.files.runs.run_folder import REPORT, write_aircraft, write_run
@@ -52,7 +50,6 @@ ESTIMATES_BAG = "estimates"
 TABLE_ROWS = 600  # times at which the tables and the report show estimates; the bag holds all
 REPORT_EVERY = 512  # samples between reports of progress
 
-WAITING = 20_000  # IMU messages that may wait for their neighbours in other topics
 
 #: Parts of the work on a piece: the shares of time at which they begin and end, and what is done.
 _IDENTIFYING, _FAULTS = (0.0, 0.7, "identifying"), (0.7, 1.0, "looking for faults")
@@ -190,8 +187,7 @@ class _Run:
         self.history, self.stamps = EstimatesLog(), array("q")
         self.samples = RecordedSamples(aircraft, flight.imu_messages)
         self.flow = flow_angle_filter.init(as_estimated(aircraft))
-        self.attitudes = _Attitudes()
-        self.force, self.lift, self.deflections = MeanForce(), MeanLift(aircraft), DeflectionLimits(aircraft)
+        self.checks = FlightChecks(aircraft)
         self.spans: dict[str, tuple[float, float]] = {}  # s, by topic
         self.joints: tuple[str, ...] = ()
         self.commands_from, self.frame_id = math.inf, ""
@@ -211,15 +207,11 @@ class _Run:
         count = sum(len(stream.arrival) for stream in streams.by_topic.values())
         aligned, known = self.alignment.take(streams, last=piece.last), len(self.stamps)
         self.began = min(self.began, float(aligned.time[0])) if aligned.time.size else self.began
-        self.force.add(aligned.time, aligned.samples[:, AZ])
-        self.lift.add(aligned.time, *aligned.samples[:, LIFT].T)
-        self.deflections.add(aligned.time, aligned.samples[:, controls_in(self.aircraft)])
+        attitude = self.checks.add(aligned, streams.imu)
         if piece.last:
-            self.force.check(self.flight.name)
-            self.lift.check(self.flight.name)
-            self.deflections.check(self.flight.name)
+            self.checks.check(self.flight.name)
         self._identify(aligned, count)
-        self._keep(aligned, streams)
+        self._keep(aligned, attitude)
         if self.monitor is not None:
             self.monitor.hear(streams, piece.commands, self._published(known), lambda s: self._tell(s, count, _FAULTS))
         self.done += count
@@ -239,10 +231,10 @@ class _Run:
             if i % REPORT_EVERY == 0:
                 self._tell(i / aligned.time.size, count, _IDENTIFYING)
 
-    def _keep(self, aligned: AlignedSamples, streams: Streams) -> None:
-        """What the report shows of the samples."""
+    def _keep(self, aligned: AlignedSamples, attitude: Array) -> None:
+        """What the report shows of the samples, with their attitude (N, 3), rad."""
         complete = flow_angle_filter.complete_many(self.flow, aligned.time, aligned.samples, self.settings.max_gap)
-        self.samples.add(aligned.time, complete, self.attitudes.at(streams.imu, aligned.stamps))
+        self.samples.add(aligned.time, complete, attitude)
 
     def _published(self, first: int) -> Iterator[RecordedEstimates]:
         """The estimates from a place on, for the fault monitor."""
@@ -288,24 +280,6 @@ class _Run:
             covariance=estimate_covariance(self.state),
             faults=self.monitor.verdict if self.monitor is not None else None,
         )
-
-
-class _Attitudes:
-    """The attitude that IMU messages hold, of which the estimator takes none."""
-
-    def __init__(self) -> None:
-        self._stamps, self._angles = np.empty(0, np.int64), np.empty((0, 3))
-
-    def at(self, imu: ImuStream, stamps: Stamps) -> Array:
-        """Roll, pitch and heading (N, 3) rad of the messages stamped ``stamps`` (N,), the last of which are ``imu``."""
-        known = np.concatenate([self._stamps, imu.arrival.stamp_ns])
-        angles = np.concatenate([self._angles, imu.attitude])
-        self._stamps, self._angles = known[-WAITING:], angles[-WAITING:]
-        if not known.size:
-            return np.full((stamps.size, 3), np.nan)
-        order = np.argsort(known, kind="stable")
-        rows = order[np.minimum(np.searchsorted(known[order], stamps), known.size - 1)]
-        return np.where((known[rows] == stamps)[:, np.newaxis], angles[rows], np.nan)
 
 
 def replay_settings(values: Mapping[str, object]) -> tuple[OnlineSettings, float]:

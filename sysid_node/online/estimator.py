@@ -171,6 +171,7 @@ def begin_with_commands(state: EstimatorState, time: float) -> EstimatorState:
         fresh.inputs.begin = max(state.inputs.begin, time + SERVOS_SETTLE)
     fresh.inputs.thrust_known, fresh.inputs.incomplete = state.inputs.thrust_known, state.inputs.incomplete
     fresh.inputs.force, fresh.inputs.unchanging = state.inputs.force, state.inputs.unchanging
+    fresh.inputs.contradiction = state.inputs.contradiction
     return fresh
 
 

@@ -14,6 +14,7 @@ from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.live.deflections import DeflectionLimits
 from sysid_node.flight.live.mean_lift import RecentMeanLift
 from sysid_node.flight.live.monitor import Durations
+from sysid_node.flight.live.reading_signs import ReadingSignsInFlight
 from sysid_node.online import estimator
 from sysid_node.online.alignment import schedule, streaming
 from sysid_node.online.estimates.covariance import EstimateCovariance, estimate_covariance
@@ -25,6 +26,7 @@ from sysid_node.online.settings import OnlineSettings
 from sysid_node.online.types import LIFT, Estimates, controls_in
 
 _of_lift = itemgetter(*LIFT)
+UNTOLD = (math.nan, math.nan)  # roll and pitch that nothing measured
 BUSY = 0.4  # share of the time between estimates in which nothing long is begun before the next
 
 
@@ -55,6 +57,7 @@ class Session:
         self.schedule = schedule.Schedule(self.publish_rate)
         self.lift = RecentMeanLift(self.aircraft)
         self.deflections = DeflectionLimits(self.aircraft)
+        self.signs = ReadingSignsInFlight()
         self.samples = 0
         self._correlated: object = None  # the slowly changing quantities whose covariance was asked for last
         self._heard = time.monotonic()
@@ -83,6 +86,16 @@ class Session:
     def force_fault(self) -> str:
         """What is wrong with the mean specific force of the last seconds, in words; empty where nothing is."""
         return self.state.inputs.force.fault
+
+    @property
+    def sign_fault(self) -> str:
+        """Which readings have the wrong sign or unit by the others, in words; empty where none has."""
+        return "" if self.force_fault else self.signs.found.fault
+
+    @property
+    def attitude_fault(self) -> str:
+        """Which angles of the attitude have the wrong sign, in words. The estimates do not depend on them."""
+        return self.signs.found.doubt
 
     @property
     def unchanging(self) -> str:
@@ -146,8 +159,12 @@ class Session:
         """Count a message that cannot be read."""
         streaming.refuse(self.alignment, topic, reason)
 
-    def imu(self, stamp_ns: int, values: tuple[float, ...]) -> list[Due]:
-        """Take an IMU message: specific force (m/s^2) and rates (rad/s), FRD. Returns what falls due."""
+    def imu(self, stamp_ns: int, values: tuple[float, ...], tilt: tuple[float, float] = UNTOLD) -> list[Due]:
+        """Take an IMU message: specific force (m/s^2) and rates (rad/s), FRD. Returns what falls due.
+
+        ``tilt``: roll and pitch (rad), NaN where it has no orientation; only the signs are compared with it.
+        """
+        self.signs.hear(stamp_ns, tilt)
         return self._take(streaming.on_imu(self.alignment, stamp_ns, values))
 
     def air_data(self, stamp_ns: int, values: tuple[float, ...]) -> list[Due]:
@@ -169,6 +186,8 @@ class Session:
             self.samples += 1
             self.lift.add(moment, *_of_lift(sample))
             self.deflections.add_sample(moment, sample[self._controls])
+            if self.signs.wants(moment) and self.signs.add(moment, streaming.stamp_of(self.alignment, moment), sample):
+                self.state.inputs.contradiction = self.signs.found.fault
             self._heard = time.monotonic()
             if schedule.due(self.schedule, moment, wait):
                 results.append(self.now())

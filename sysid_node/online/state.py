@@ -229,6 +229,7 @@ class EstimatorInputs:
     incomplete: dict[str, int] = field(default_factory=dict)  # samples left out, by the column that was missing
     thrust_known: bool | None = None  # whether the first sample had one; None = none has come yet
     force: RecentMeanForce = field(default_factory=RecentMeanForce)  # specific force along z
+    contradiction: str = ""  # which readings contradict the others by their signs, in words
     unchanging: UnchangingReadings = field(default_factory=UnchangingReadings)
     interruptions: Interruptions = field(default_factory=Interruptions)
 

@@ -15,6 +15,7 @@ from sysid_node.aircraft.model import Aircraft
 #: sample lies between, s: the flow angles' noise density is their variance times it. Body axes FRD.
 SAMPLE_COLUMNS = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "thrust", "air_interval")
 AZ = SAMPLE_COLUMNS.index("az")  # place of the specific force along z in a sample
+MOTION, AIR = slice(0, 6), slice(6, 9)  # places of the IMU's readings, and of airspeed and flow angles
 LIFT = tuple(SAMPLE_COLUMNS.index(name) for name in ("az", "V", "alpha", "rho"))  # places of what tells of the lift
 
 

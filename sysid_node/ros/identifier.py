@@ -134,7 +134,8 @@ class Identifier(CarefulNode):
 
         Messages stay serialised: to make objects of all their parts would take longer than the estimator does.
         """
-        monitor, reader = self._monitors[topic], MessageReader(fields_of, INPUT_TOPICS[topic], *messages.PATHS[topic])
+        monitor, paths = self._monitors[topic], messages.ATTITUDE_PATHS if topic == IMU else messages.PATHS[topic]
+        reader = MessageReader(fields_of, INPUT_TOPICS[topic], *paths)
 
         def on_message(raw: bytes) -> None:
             monitor.arrived()
@@ -159,7 +160,7 @@ class Identifier(CarefulNode):
 
     def _on_imu(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
         self._frame_id = str(texts[0])
-        return session.imu(*messages.imu(numbers, self._body_frame))
+        return session.imu(*messages.imu_and_attitude(numbers, self._body_frame))
 
     def _on_air_data(self, session: Session, numbers: Numbers, texts: Texts) -> list[Due]:
         return session.air_data(*messages.air_data(numbers))
@@ -244,9 +245,13 @@ class Identifier(CarefulNode):
         )
         monitors, rejected = list(self._monitors.values()), session.rejected
         recent = self._recent.update(monitors, rejected)
-        readings, max_gap = (session.force_fault, session.unchanging), session.settings.max_gap
+        readings = (session.force_fault, session.sign_fault, session.unchanging)
+        max_gap = session.settings.max_gap
         doubled = [f"{topic}: {text}" for topic, text in several_publishers(self, self._inputs).items()]
-        doubts = (session.lift_fault, session.deflections.fault, session.interruptions, *doubled)
+        doubts = (
+            *(session.lift_fault, session.deflections.fault, session.attitude_fault, session.interruptions),
+            *doubled,
+        )
         doubt = "; ".join(filter(None, doubts))
         message.status.append(source.input(monitors, rejected, stale_after, recent, readings, max_gap, doubt))
         self._warn(session, monitors, recent)
@@ -286,6 +291,10 @@ class Identifier(CarefulNode):
             present[here] += f"; expected joints {', '.join(joints)}, got {', '.join(self._joints)}"
         if session.force_fault:
             present["accelerometer"] = session.force_fault
+        if session.sign_fault:
+            present["signs"] = session.sign_fault
+        if session.attitude_fault:
+            present["attitude"] = session.attitude_fault
         if session.unchanging:
             present["readings"] = session.unchanging
         if session.lift_fault:

@@ -142,3 +142,37 @@ def test_an_imu_that_is_interrupted_every_second_is_said_in_flight(session: Sess
     assert ("interruptions of up to 0.2" in session.interruptions) == said
     session.reset()
     assert session.interruptions == ""
+
+
+def flown_with_rates(sign: float) -> Session:
+    """A session after 30 s of a bundled flight whose yaw and pitch rates are multiplied by a sign."""
+    flight = read_streams(ROOT / "bags" / "cdrw_multistep")
+    session = Session(load_aircraft("cdrw"), OnlineSettings(), 10.0)
+    names, imu = flight.actuators.names, flight.imu
+    events = [(at, 0, i) for i, at in enumerate(imu.arrival.stamp_ns.tolist())]
+    events += [(at, 1, i) for i, at in enumerate(flight.air_data.arrival.stamp_ns.tolist())]
+    events += [(at, 2, i) for i, at in enumerate(flight.actuators.arrival.stamp_ns.tolist())]
+    begin = min(events)[0]
+    for at, topic, i in sorted(event for event in events if event[0] - begin < 30 * 10**9):
+        if topic == 0:
+            *force, p, q, r = imu.values[i].tolist()
+            phi, theta, _ = imu.attitude[i].tolist()
+            session.imu(at, (*force, p, sign * q, sign * r), (phi, theta))
+        elif topic == 1:
+            session.air_data(at, tuple(flight.air_data.values[i].tolist()))
+        else:
+            session.actuators(at, names, flight.actuators.positions[i].tolist())
+    return session
+
+
+def test_no_estimate_is_valid_where_rates_are_in_other_axes() -> None:
+    """Forward, left, up taken for forward, right, down turns the signs of q and r."""
+    session = flown_with_rates(-1.0)
+    assert session.sign_fault.startswith("q, r or ay: the sign is wrong")
+    assert {one.status for one in session.now().estimates.derivatives.values()} == {"outside model"}
+
+
+def test_a_sound_flight_has_valid_estimates_and_no_sign_fault() -> None:
+    session = flown_with_rates(1.0)
+    assert (session.sign_fault, session.attitude_fault) == ("", "")
+    assert any(one.valid for one in session.now().estimates.derivatives.values())

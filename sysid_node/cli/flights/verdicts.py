@@ -16,16 +16,13 @@ from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import joined_spans, stamp_spans, why_nothing_aligned
 from sysid_node.flight.frames import BodyFrame
-from sysid_node.flight.live.deflections import DeflectionLimits
 from sysid_node.flight.live.interruptions import Interruptions
-from sysid_node.flight.live.mean_force import MeanForce
-from sysid_node.flight.live.mean_lift import MeanLift
 from sysid_node.flight.logs.checks.survey import FULL_DEFLECTION, OUTPUTS, LogSurvey
 from sysid_node.flight.logs.opening import carried_by, load_flight_record
 from sysid_node.flight.pieces import flight_pieces
+from sysid_node.online.alignment.flight_checks import FlightChecks
 from sysid_node.online.alignment.in_pieces import PieceAlignment
 from sysid_node.online.settings import FIRST_ESTIMATE, OnlineSettings, too_short_to_replay
-from sysid_node.online.types import AZ, LIFT, controls_in
 
 #: The shortest flight that ``sysid gap`` diagnoses, s (``gap.flightdata.gap_flight``, which takes long to load).
 SHORTEST_FOR_GAP = 6.0
@@ -109,8 +106,7 @@ def _replayed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame)
         alignment = None
         spans: dict[str, tuple[float, float]] = {}
         names: tuple[str, ...] = ()
-        force, lift, interruptions = MeanForce(), MeanLift(aircraft), Interruptions()
-        deflections = DeflectionLimits(aircraft)
+        checks, interruptions = FlightChecks(aircraft), Interruptions()
         began = last = math.nan
         for piece in flight.pieces:
             names, spans = piece.streams.actuators.names, joined_spans(spans, stamp_spans(piece.streams))
@@ -119,13 +115,9 @@ def _replayed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame)
             if aligned.time.size:
                 interruptions.add_samples(last, aligned.time, max_gap)
                 began, last = float(aligned.time[0]) if math.isnan(began) else began, float(aligned.time[-1])
-            force.add(aligned.time, aligned.samples[:, AZ])
-            lift.add(aligned.time, *aligned.samples[:, LIFT].T)
-            deflections.add(aligned.time, aligned.samples[:, controls_in(aircraft)])
-        if force.count:
-            force.check(flight.name)
-            lift.check(flight.name)
-            deflections.check(flight.name)
+            checks.add(aligned, piece.streams.imu)
+        if not math.isnan(last):
+            checks.check(flight.name)
             if last - began < FIRST_ESTIMATE:
                 raise InputError(too_short_to_replay(flight.name, last - began))
             if broken := interruptions.fault(last, max_gap):

@@ -36,7 +36,7 @@ PATHS: Mapping[str, Paths] = MappingProxyType(
 #: What is read of IMU messages where the orientation is needed, too.
 ATTITUDE_PATHS: Paths = (
     (*_STAMP, *(f"orientation.{axis}" for axis in "xyzw"), "orientation_covariance", *_VECTORS),
-    (),
+    ("header.frame_id",),
 )
 _COVARIANCE = 9  # numbers in a covariance matrix
 

@@ -190,7 +190,7 @@ def judge(state: EstimatorState, latest: SegmentSolution, current: CurrentSoluti
         good &= ~poor.take(table.coefficient)
     bad = ~good
     codes: Codes = bad * _reasons(state, basis, current, bad, inflation, below_noise, poor)
-    if state.inputs.force.fault:
+    if state.inputs.force.fault or state.inputs.contradiction:
         codes[:] = status.OUTSIDE
     _withhold_unchanging(state, codes)
     if current.time - state.changes.changed_at < SETTLING:

@@ -1,0 +1,107 @@
+"""How often a reading of the wrong sign or unit is seen: real, bundled and simulated flights, each mistake in turn.
+
+    python -m bench.robustness.wrong_readings [--page docs/results/wrong_readings.md]
+
+A flight is changed as a user may have it, and read as ``sysid replay`` and ``sysid identify`` read it. Flights shorter
+than 13 s, which tell nothing, are left out. ``SYSID_FLIGHTS`` names the folder of the real flights.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import tempfile
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from bench.pages import publish, table
+from bench.speed.diagnosis import flown
+from sysid_node import load
+from sysid_node.errors import InputError
+from sysid_node.flight.csv import read_csv
+from sysid_node.flight.live.reading_signs import checked_signs
+from sysid_node.flight.record import FlightRecord
+
+_SHORTEST = 13.0  # s
+_BAGS = Path(__file__).parents[2] / "bags"
+_AIRCRAFT = ("cdrw", "cdfp", "kestrel")
+_UNMEASURED = {"phi": math.nan, "theta": math.nan, "psi": math.nan}
+_DEGREES = math.degrees(1.0)
+
+#: By what is wrong: the factors of the readings, and a part of what is then said.
+_MISTAKES: Mapping[str, tuple[Mapping[str, float], str]] = {
+    "nothing": ({}, ""),
+    "p reversed": ({"p": -1.0}, "p"),
+    "q reversed": ({"q": -1.0}, "q"),
+    "r reversed": ({"r": -1.0}, "r"),
+    "q and r reversed: forward, left, up as forward, right, down": ({"q": -1.0, "r": -1.0}, "q"),
+    "the same without attitude": ({"q": -1.0, "r": -1.0, **_UNMEASURED}, "q"),
+    "angle of attack reversed": ({"alpha": -1.0}, "angle of attack"),
+    "sideslip reversed": ({"beta": -1.0}, "sideslip"),
+    "rates in deg/s": (dict.fromkeys("pqr", _DEGREES), "deg/s"),
+    "airspeed in knots": ({"V": 1.944}, "true_airspeed"),
+    "airspeed in mph": ({"V": 2.237}, "true_airspeed"),
+    "airspeed in km/h": ({"V": 3.6}, "true_airspeed"),
+}
+
+
+def main() -> None:
+    """Print the table, or put it in a page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
+    args = parser.parse_args()
+    warnings.simplefilter("ignore")
+    groups = {"real": list(_real()), "bundled": list(_bundled())}
+    with tempfile.TemporaryDirectory() as folder:
+        for weather in ("none", "light", "moderate"):
+            groups[f"simulated, turbulence {weather}"] = list(_simulated(Path(folder), weather))
+    rows = [(mistake, *(_share(flights, *_MISTAKES[mistake]) for flights in groups.values())) for mistake in _MISTAKES]
+    heads = ("what is wrong", *(f"{name} ({len(flights)})" for name, flights in groups.items()))
+    publish("bench/robustness/wrong_readings.py", table(heads, rows), args.page)
+
+
+def _real() -> Iterator[FlightRecord]:
+    folder = Path(os.environ.get("SYSID_FLIGHTS", ""))
+    for path in sorted(folder.glob("*.csv")) if folder.name else []:
+        flight = read_csv(path)
+        if flight.time[-1] - flight.time[0] >= _SHORTEST:
+            yield flight
+
+
+def _bundled() -> Iterator[FlightRecord]:
+    for bag in sorted(path for path in _BAGS.glob("cd*_*") if path.is_dir()):
+        yield load(bag, bag.name[:4]).record
+
+
+def _simulated(folder: Path, weather: str) -> Iterator[FlightRecord]:
+    for aircraft in _AIRCRAFT:
+        for seed, manoeuvre in enumerate(("3211", "multisine"), 1):
+            words = ("--manoeuvre", manoeuvre, "--duration", "60", "--turbulence", weather)
+            bag = flown(folder / f"{aircraft}_{weather}_{manoeuvre}", seed, words, aircraft)
+            yield load(bag, aircraft).record
+
+
+def _share(flights: list[FlightRecord], factors: Mapping[str, float], said: str) -> str:
+    """How many flights are refused for what is wrong, and how many for something else."""
+    texts = [_fault(flight, factors) for flight in flights]
+    right = sum(bool(text) and said in text for text in texts)
+    other = sum(bool(text) for text in texts) - right
+    return f"{right} and {other} otherwise" if other else str(right)
+
+
+def _fault(flight: FlightRecord, factors: Mapping[str, float]) -> str:
+    """Why the flight is refused with its readings changed; empty where it is not."""
+    columns = dict(flight.columns)
+    columns |= {name: factor * columns[name] for name, factor in factors.items() if name in columns}
+    try:
+        checked_signs(replace(flight, columns=columns, name="flight"))
+    except InputError as error:
+        return str(error).removeprefix("flight: ")
+    return ""
+
+
+if __name__ == "__main__":
+    main()
