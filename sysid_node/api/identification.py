@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.opposite_estimates import opposite_estimates
 from sysid_node.api.compiled_programs import release_compiled_programs
 from sysid_node.api.estimated_run import EstimatedRun
 from sysid_node.api.flight_file import FlightFile, flight_list, read_alike, refuse_other_aircraft
@@ -91,5 +92,8 @@ def identify(
         warnings.warn(f"{method.replace('_', ' ')}: {found.fit.search.message}", InputWarning, stacklevel=2)
     tell(0.9, "spectra")
     result = identification_result(aircraft, records, found, chosen, read_truth(flights[0].path))
-    result = replace(result, remarks=[*noted, *result.remarks])
+    opposite = opposite_estimates(aircraft, result.final.derivatives) if result.final else []
+    for text in opposite:
+        warnings.warn(f"{records[0].name}: {text}", InputWarning, stacklevel=2)
+    result = replace(result, remarks=[*noted, *opposite, *result.remarks])
     return BatchIdentification(result, found, aircraft)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.opposite_estimates import opposite_estimates
 from sysid_node.aircraft.stated_effects import as_estimated, not_taken_in_words
 from sysid_node.api.estimated_run import EstimatedRun
 from sysid_node.api.flight_file import FlightFile, flight_list
@@ -258,7 +259,8 @@ class _Run:
         final = estimate(self.state, last)
         inputs = self.state.inputs
         broken = inputs.interruptions.fault(inputs.previous[0], self.settings.max_gap) if inputs.previous else ""
-        for wrong in filter(None, (inputs.unchanging.fault, broken)):
+        opposite = opposite_estimates(self.aircraft, final.derivatives)
+        for wrong in filter(None, (inputs.unchanging.fault, broken, *opposite)):
             warnings.warn(f"{self.flight.name}: {wrong}", InputWarning, stacklevel=2)
         seconds = last - self.began
         if seconds < FIRST_ESTIMATE and not any(math.isfinite(d.value) for d in final.derivatives.values()):

@@ -9,6 +9,7 @@ from operator import itemgetter
 from typing import NamedTuple
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.aircraft.opposite_estimates import opposite_estimates
 from sysid_node.flight.align import counts_by_reason
 from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.live.deflections import DeflectionLimits
@@ -114,6 +115,23 @@ class Session:
     def lift_fault(self) -> str:
         """What does not go together of weight, airspeed and angle of attack, in words; empty where nothing is wrong."""
         return "" if self.force_fault else self.lift.fault
+
+    @property
+    def faults(self) -> dict[str, str]:
+        """What withholds estimates, in words, by its subject."""
+        found = {"accelerometer": self.force_fault, "signs": self.sign_fault, "readings": self.unchanging}
+        return {subject: text for subject, text in found.items() if text}
+
+    def doubts(self, due: Due | None) -> dict[str, str]:
+        """What looks wrong and withholds nothing, in words, by its subject. ``due``: the last estimates, if any."""
+        found = {
+            "lift": self.lift_fault,
+            "deflections": self.deflections.fault,
+            "attitude": self.attitude_fault,
+            "samples": self.interruptions,
+            "derivatives": "; ".join(opposite_estimates(self.aircraft, due.estimates.derivatives)) if due else "",
+        }
+        return {subject: text for subject, text in found.items() if text}
 
     @property
     def silence(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -245,20 +245,15 @@ class Identifier(CarefulNode):
         )
         monitors, rejected = list(self._monitors.values()), session.rejected
         recent = self._recent.update(monitors, rejected)
-        readings = (session.force_fault, session.sign_fault, session.unchanging)
-        max_gap = session.settings.max_gap
+        due = due or (session.now(session.silence) if session.samples else None)
+        wrong, doubts = session.faults, session.doubts(due)
         doubled = [f"{topic}: {text}" for topic, text in several_publishers(self, self._inputs).items()]
-        doubts = (
-            *(session.lift_fault, session.deflections.fault, session.attitude_fault, session.interruptions),
-            *doubled,
-        )
-        doubt = "; ".join(filter(None, doubts))
+        doubt, readings, max_gap = "; ".join([*doubts.values(), *doubled]), [*wrong.values()], session.settings.max_gap
         message.status.append(source.input(monitors, rejected, stale_after, recent, readings, max_gap, doubt))
-        self._warn(session, monitors, recent)
-        if not session.samples:
+        self._warn(session, monitors, recent, wrong | doubts)
+        if due is None:
             message.status += [source.waits("estimate"), source.waits("computation")]
             return
-        due = due or session.now(session.silence)
         self._say_what_actuators_carry(session.carried(due.estimates))
         silence = session.silence if session.silence > stale_after else 0.0
         if silence:
@@ -276,8 +271,14 @@ class Identifier(CarefulNode):
             self._carried = carried
             self.get_logger().info(carried or "Actuators carry positions.")
 
-    def _warn(self, session: Session, monitors: Sequence[TopicMonitor], recent: Sequence[RecentTopic]) -> None:
-        """Say in the log which inputs are silent, rejected or late."""
+    def _warn(
+        self,
+        session: Session,
+        monitors: Sequence[TopicMonitor],
+        recent: Sequence[RecentTopic],
+        wrong: Mapping[str, str],
+    ) -> None:
+        """Say in the log which inputs are silent, rejected, late or ``wrong``."""
         present = self._clock_watch.missing() | {
             monitor.resolved: waiting(self, monitor, subscription)
             for monitor, subscription in zip(monitors, self._inputs, strict=True)
@@ -289,20 +290,7 @@ class Identifier(CarefulNode):
         missing = [joint for joint in joints if joint not in self._joints]
         if missing and here in present and self._joints:
             present[here] += f"; expected joints {', '.join(joints)}, got {', '.join(self._joints)}"
-        if session.force_fault:
-            present["accelerometer"] = session.force_fault
-        if session.sign_fault:
-            present["signs"] = session.sign_fault
-        if session.attitude_fault:
-            present["attitude"] = session.attitude_fault
-        if session.unchanging:
-            present["readings"] = session.unchanging
-        if session.lift_fault:
-            present["lift"] = session.lift_fault
-        if session.deflections.fault:
-            present["deflections"] = session.deflections.fault
-        if session.interruptions:
-            present["samples"] = session.interruptions
+        present |= wrong
         if session.samples and lag_level(self._lag) != DiagnosticStatus.OK:
             present["estimates"] = lag_words(self._lag)
         say(self, self._conditions.update(joined(present, several_publishers(self, self._inputs))))

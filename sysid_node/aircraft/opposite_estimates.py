@@ -1,0 +1,73 @@
+"""Whether estimates show that controls or the side force are recorded otherwise than the aircraft file says.
+
+A surface that is counted the other way has derivatives of the other sign, and positions from -1 to 1 have derivatives
+that are the limit in rad times those of the file. Nothing else in a flight shows either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from sysid_node.aircraft.model import Aircraft, Control
+
+_MOMENTS = ("Cl", "Cm", "Cn")
+_CERTAIN = 5.0  # standard errors from zero beyond which a sign is certain
+_ALIKE = 0.25  # share within which a factor is the limit in rad
+_FEWEST = 2  # controls that must show it: one alone may have lost a part of its effect
+
+
+class _Estimate(Protocol):
+    @property
+    def value(self) -> float: ...
+    @property
+    def standard_error(self) -> float: ...
+    @property
+    def valid(self) -> bool: ...
+
+
+def opposite_estimates(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
+    """What valid estimates show, a sentence each; none where nothing is wrong."""
+    strongest = {control.name: _strongest_moment(aircraft, control) for control in aircraft.controls.values()}
+    factors = {
+        control: estimates[name].value / aircraft.derivatives[name].value
+        for control, name in strongest.items()
+        if _certain(estimates.get(name))
+    }
+    found = [
+        f"{strongest[control]} is {estimates[strongest[control]].value:.3g}, and of the other sign in the aircraft "
+        f"file: is {control} counted the other way? If so, change the sign of its joint's scale"
+        for control, factor in factors.items()
+        if factor < 0.0
+    ]
+    found += _as_shares(aircraft, factors)
+    side = estimates.get("CY_beta")
+    if side is not None and _certain(side) and side.value > 0.0:
+        found.append(f"CY_beta is {side.value:.3g}, and negative for every aircraft: is the sign of ay right?")
+    return found
+
+
+def _as_shares(aircraft: Aircraft, factors: Mapping[str, float]) -> list[str]:
+    """What is said where all ``factors``, estimates by the values of the file, are as of positions from -1 to 1."""
+    limits = {name: aircraft.controls[name].limit for name in factors}
+    if len(factors) < _FEWEST or not all(
+        limit and abs(abs(factors[name]) / limit - 1.0) < _ALIKE for name, limit in limits.items()
+    ):
+        return []
+    times = ", ".join(f"{factor:.2f}" for factor in factors.values())
+    return [
+        f"derivatives by {', '.join(factors)} are {times} times those of the aircraft file, as the limits in rad are: "
+        "are the positions from -1 to 1? If so, multiply the joints' scales by the limits"
+    ]
+
+
+def _strongest_moment(aircraft: Aircraft, control: Control) -> str:
+    """The derivative of a moment by the control that is the largest by the file; empty where there is none."""
+    names = [f"{moment}_{control.symbol}" for moment in _MOMENTS]
+    known = [name for name in names if name in aircraft.derivatives and aircraft.derivatives[name].value]
+    return max(known, key=lambda name: abs(aircraft.derivatives[name].value), default="")
+
+
+def _certain(estimate: _Estimate | None) -> bool:
+    """Whether an estimate is valid and its sign certain."""
+    return estimate is not None and estimate.valid and abs(estimate.value) > _CERTAIN * estimate.standard_error
