@@ -10,6 +10,7 @@ along. Wind and noise reduce the slopes; they do not turn their signs.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.flight.record import Array
 
 SPAN = 0.5  # s over which the readings are integrated
+LAG = 0.1  # s; five of them are one span
 _LONGEST_STEP = 0.2  # s from sample to sample within a span
 _FEWEST = 20  # degrees of freedom from which on a relation tells
 _NOTHING = 1e-9  # share of a column's power under which what is left of it is rounding
@@ -27,9 +29,11 @@ _MOST = 1.0 - 1e-12  # correlation: Fisher's z has an end
 _READINGS = 13  # of a sample, its time included
 
 #: What is known of each span: how long it is, changes (d_) and integrals. u, v, w: velocity along body x, y, z, m/s.
+_LATER = tuple(f"{change}_{lag}" for lag in range(1, 6) for change in ("d_v", "d_w"))  # flow angles so many LAGs later
 _COLUMNS = (
     *("time", "d_phi", "d_theta", "d_psi", "d_p", "d_q", "d_r", "d_v", "d_w"),
     *("phi_rate", "theta_rate", "psi_rate", "force_y", "force_z", "qu", "ru", "pv", "pw"),
+    *_LATER,
 )
 _PLACE = {name: i for i, name in enumerate(_COLUMNS)}
 
@@ -73,7 +77,7 @@ class KinematicRelations:
     def __init__(self) -> None:
         self._gram = np.zeros((len(_COLUMNS), len(_COLUMNS)))
         self._counts = np.zeros(len(_COLUMNS))  # spans in which each column is known
-        self._rest = np.empty((0, _READINGS))  # samples since the end of the last span
+        self._rest = np.empty((0, _READINGS))  # samples since the end of the last span that was looked at
 
     def add(self, time: Array, motion: Array, air: Array, attitude: Array) -> None:
         """Count samples (N,) at increasing times, s, in body axes forward, right, down.
@@ -86,17 +90,24 @@ class KinematicRelations:
             self._rest = samples
             return
         _, ends = np.unique(samples[:, 0] // SPAN, return_index=True)  # so that pieces of any length give the same
-        self._rest = samples[ends[-1] :]
-        if ends.size > 1:
-            spans, known = _spans(samples[: ends[-1] + 1], ends)
-            self._gram += spans.T @ spans
-            self._counts += known.sum(axis=0)
+        if ends.size < 4:  # the last span is not complete, and flow angles up to a span later are looked at
+            self._rest = samples
+            return
+        self._rest = samples[ends[-3] :]
+        spans, known = _spans(samples, ends[:-2])
+        self._gram += spans.T @ spans
+        self._counts += known.sum(axis=0)
 
-    def agreement(self, relation: str) -> Agreement:
-        """What the flight so far says of a relation; zeros where that is too little."""
+    def late(self, relation: str) -> float:
+        """The largest correlation of "alpha" or "beta" with flow angles that come up to a span late; 0 or more."""
+        (change,) = RELATIONS[relation].regressor
+        return max(self.agreement(relation, {f"{change}_{lag}": 1.0}).correlation for lag in range(6) if lag) or 0.0
+
+    def agreement(self, relation: str, other: Mapping[str, float] | None = None) -> Agreement:
+        """What the flight so far says of a relation, or by an ``other`` regressor; zeros where that is too little."""
         response, regressor, along = RELATIONS[relation]
         both = np.zeros((len(_COLUMNS), 2))
-        for i, terms in enumerate((response, regressor)):
+        for i, terms in enumerate((response, other or regressor)):
             both[[_PLACE[name] for name in terms], i] = list(terms.values())
         places = [_PLACE[name] for name in along]
         freedom = self._counts[both.any(axis=1)].min() - len(along) - 3
@@ -116,11 +127,16 @@ def _spans(samples: Array, ends: NDArray[np.intp]) -> tuple[Array, NDArray[np.bo
 
     Zeros stand for what is not known: they take no part in the sums.
     """
-    time = samples[:, 0]
+    time, last = samples[:, 0], int(ends[-1])
     changing, integrands = _columns(samples)
-    steps = np.diff(time)
-    trapezoids = 0.5 * (integrands[1:] + integrands[:-1]) * steps[:, np.newaxis]
-    spans = np.column_stack([np.diff(changing[ends], axis=0), np.add.reduceat(trapezoids, ends[:-1])])
+    steps = np.diff(time[: last + 1])
+    trapezoids = 0.5 * (integrands[1 : last + 1] + integrands[:last]) * steps[:, np.newaxis]
+    flow = changing[:, [_PLACE["d_v"], _PLACE["d_w"]]].T
+    later = [np.interp(time[ends] + lag * LAG, time, angle) for lag in range(1, 6) for angle in flow]
+    changes = np.column_stack([np.diff(changing[ends], axis=0), np.diff(later, axis=1).T])
+    own = changing.shape[1]
+    integrals = np.add.reduceat(trapezoids, ends[:-1])
+    spans = np.column_stack([changes[:, :own], integrals, changes[:, own:]])
     headings = spans[:, _PLACE["d_psi"]]
     headings -= 2.0 * math.pi * np.round(headings / (2.0 * math.pi))
     moving = np.isfinite(spans[:, [_PLACE["force_z"], _PLACE["qu"]]]).all(axis=1)

@@ -23,7 +23,7 @@ _CLEAR = 0.5  # wind that the aircraft answers correlates readings weakly, and t
 _LIKELY = 3.0  # standard deviations from which on a relation tells which of two readings is wrong
 #: Times the true airspeed from which on its unit is wrong, and the inverse. In knots it is 1.94 times.
 _ANOTHER_UNIT = 1.55
-_DEGREES = math.degrees(1.0) / 3.0  # times the true rate from which on it is in degrees
+_CLOSE = 0.7  # correlation from which on the factor is believed
 EVERY = 0.05  # s between the samples that count in flight
 _JUDGED = 5.0  # s from judgement to judgement in flight
 _WAITING = 2000  # IMU messages whose samples may still come
@@ -41,8 +41,9 @@ _FLOW_ANGLES = {"alpha": ("angle of attack", "below"), "beta": ("sideslip", "the
 class Contradictions(NamedTuple):
     """What contradicts the rest, in words; empty where nothing does."""
 
-    fault: str = ""  # readings from which derivatives are estimated
-    doubt: str = ""  # angles of the attitude, from which none is
+    fault: str = ""  # signs and units of the rates, the airspeed and the flow angles
+    scale: str = ""  # flow angles that are far too large or too small, which a diagnosis of the gap can name
+    doubt: str = ""  # angles of the attitude, from which no derivative is estimated
 
 
 class ReadingSigns:
@@ -57,16 +58,35 @@ class ReadingSigns:
 
     @property
     def contradictions(self) -> Contradictions:
-        """What the flight so far shows."""
-        return contradictions({name: self._relations.agreement(name) for name in RELATIONS})
-
-    def check(self, name: str) -> None:
-        """Raise InputError where readings contradict the rest; warn (InputWarning) where only the attitude does."""
-        fault, doubt = self.contradictions
+        """What the flight so far shows. A wrong rate makes other relations wrong, so that it is said alone."""
+        found = {name: self._relations.agreement(name) for name in RELATIONS}
+        rates, angles = _wrong_turns(found)
+        fault = _rate_fault(found) or _sign_fault(rates) or _airspeed_fault(found) or self._flow_fault(found)
         if fault:
-            raise InputError(f"{name}: {fault}")
-        if doubt:
-            warnings.warn(f"{name}: {doubt}", InputWarning, stacklevel=2)
+            return Contradictions(fault)
+        doubt = f"{', '.join(angles)} of the attitude: the sign is wrong by rates and accelerations" if angles else ""
+        return Contradictions("", _scale_fault(found), doubt)
+
+    def _flow_fault(self, found: Mapping[str, Agreement]) -> str:
+        """Which flow angles have the wrong sign, in words. One that comes late may seem to have it."""
+        wrong = [name for name in _FLOW_ANGLES if _opposite(found[name])]
+        wrong = [name for name in wrong if -found[name].correlation > self._relations.late(name)]
+        sides = {name: f"positive with air from {side}" for name, (_, side) in _FLOW_ANGLES.items()}
+        texts = [
+            f"{_FLOW_ANGLES[name][0]}: the sign is wrong by rates and accelerations; {sides[name]}" for name in wrong
+        ]
+        return "; ".join(texts)
+
+    def check(self, name: str, *, scales: bool = True) -> None:
+        """Raise InputError where readings contradict the rest; warn (InputWarning) where only the attitude does.
+
+        Without ``scales`` it is also a warning where flow angles are too large or too small.
+        """
+        fault, scale, doubt = self.contradictions
+        if fault or (scale and scales):
+            raise InputError(f"{name}: {fault or scale}")
+        for text in filter(None, (scale, doubt)):
+            warnings.warn(f"{name}: {text}", InputWarning, stacklevel=2)
 
 
 class ReadingSignsInFlight:
@@ -104,24 +124,6 @@ class ReadingSignsInFlight:
         return True
 
 
-def contradictions(found: Mapping[str, Agreement]) -> Contradictions:
-    """What the agreement of all relations shows. A wrong rate makes other relations wrong, so that it is said alone."""
-    in_degrees = [rate for rate, (_, turn, _, _) in _TURNS.items() if _much_less(found[turn])]
-    if in_degrees:
-        return Contradictions(f"{_listed(in_degrees)}: over {_DEGREES:.0f} times what the attitude turns; in deg/s?")
-    rates, angles = _wrong_turns(found)
-    if rates:
-        axes = "axes are forward, left, up where body_frame is flu, and forward, right, down where it is frd"
-        return Contradictions(f"{_listed(rates)}: the sign is wrong by the other readings; {axes}")
-    flow = [
-        f"{angle}: the sign is wrong by rates and accelerations; it is positive with air from {side}"
-        for relation, (angle, side) in _FLOW_ANGLES.items()
-        if _opposite(found[relation])
-    ]
-    doubt = f"{_listed(angles)} of the attitude: the sign is wrong by rates and accelerations" if angles else ""
-    return Contradictions(_airspeed_fault(found) or "; ".join(flow), doubt)
-
-
 def _wrong_turns(found: Mapping[str, Agreement]) -> tuple[list[str], list[str]]:
     """The rates whose sign is wrong, and the angles of the attitude; rates where that cannot be told."""
     turned = [rate for rate, (_, turn, _, _) in _TURNS.items() if _opposite(found[turn])]
@@ -143,31 +145,50 @@ def _wrong_turns(found: Mapping[str, Agreement]) -> tuple[list[str], list[str]]:
     return rates, angles
 
 
+def _sign_fault(rates: Sequence[str]) -> str:
+    """That rates have the wrong sign, in words."""
+    axes = "axes are forward, left, up where body_frame is flu, and forward, right, down where it is frd"
+    return f"{', '.join(rates)}: the sign is wrong by the other readings; {axes}" if rates else ""
+
+
+def _rate_fault(found: Mapping[str, Agreement]) -> str:
+    """That rates are in another unit, in words."""
+    times = {rate: _times(found[turn]) for rate, (_, turn, _, _) in _TURNS.items()}
+    wrong = {rate: f"{factor:.2g}" for rate, factor in times.items() if factor != 1.0}
+    if not wrong:
+        return ""
+    return f"{', '.join(wrong)}: about {', '.join(wrong.values())} times what the attitude turns; in rad/s?"
+
+
 def _airspeed_fault(found: Mapping[str, Agreement]) -> str:
     """That the airspeed is in another unit, in words. Without vanes the relation is too weak to tell."""
-    seen = found["vertical"]
-    if found["alpha"] == Agreement() or seen.score < _CERTAIN:
+    seen, known = found["vertical"], found["alpha"] != Agreement()
+    if not known or seen.score < _CERTAIN or max(seen.inverse, seen.slope) < _ANOTHER_UNIT:
         return ""
-    if max(seen.inverse, seen.slope) < _ANOTHER_UNIT:
-        return ""
+    what = "true_airspeed" if found["pitch"].score >= _CERTAIN else "true_airspeed or q"
     times = math.sqrt(seen.inverse / seen.slope)
-    return f"true_airspeed: about {times:.1f} times what accelerations and pitch rate show; is it in m/s?"
+    return f"{what}: about {times:.2g} times what accelerations and pitch rate show; in m/s and rad/s?"
+
+
+def _scale_fault(found: Mapping[str, Agreement]) -> str:
+    """That flow angles are far too large or too small, in words."""
+    times = {angle: _times(found[name]) for name, (angle, _) in _FLOW_ANGLES.items()}
+    texts = [f"{angle}: about {factor:.2g} times" for angle, factor in times.items() if factor != 1.0]
+    return f"{', '.join(texts)} what rates and accelerations show; is the scale right?" if texts else ""
 
 
 def _opposite(seen: Agreement) -> bool:
     return seen.score <= -_CERTAIN and seen.correlation <= -_CLEAR
 
 
-def _much_less(seen: Agreement) -> bool:
-    """Whether an angle turns far less than its rate says."""
-    return seen.score >= _CERTAIN and 0.0 < seen.slope < 1.0 / _DEGREES and seen.inverse > _DEGREES
+def _times(seen: Agreement) -> float:
+    """How many times too large a reading is by a relation in which it is the regressor; 1 unless it is far off."""
+    if seen.score < _CERTAIN or seen.correlation < _CLOSE or max(seen.inverse, seen.slope) < _ANOTHER_UNIT:
+        return 1.0
+    return math.sqrt(seen.inverse / seen.slope)
 
 
-def _listed(names: list[str]) -> str:
-    return ", ".join(names)
-
-
-def checked_signs(record: FlightRecord) -> FlightRecord:
+def checked_signs(record: FlightRecord, *, scales: bool = True) -> FlightRecord:
     """The record as it is, its readings' signs checked. Raises and warns as ``ReadingSigns.check``."""
     signs = ReadingSigns()
     missing = np.full(record.time.size, math.nan)
@@ -176,5 +197,5 @@ def checked_signs(record: FlightRecord) -> FlightRecord:
         for names in (("ax", "ay", "az", "p", "q", "r"), ("V", "alpha", "beta"), ("phi", "theta", "psi"))
     )
     signs.add(record.time, motion, air, attitude)
-    signs.check(record.name)
+    signs.check(record.name, scales=scales)
     return record

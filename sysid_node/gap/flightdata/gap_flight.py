@@ -16,6 +16,7 @@ from sysid_node.flight.align import flight_record
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.live.mean_force import checked_force
+from sysid_node.flight.live.reading_signs import checked_signs
 from sysid_node.flight.logs.opening import is_table, open_streams
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import Streams
@@ -74,7 +75,7 @@ def load_gap_flight(
     Raises InputError where it is unreadable, lacks a signal or is too short.
     """
     if is_table(path, topics, frame):
-        record = checked_force(read_csv(path))
+        record = checked_signs(checked_force(read_csv(path)), scales=False)
         rate = 1.0 / float(np.median(np.diff(record.time)))
         return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
     return flight_of_streams(open_streams(path, aircraft, topics, frame), aircraft, str(path), carried)
@@ -85,6 +86,7 @@ def flight_of_streams(streams: Streams, aircraft: Aircraft, source: str = "", ca
     Actuation.of(aircraft).require(streams.actuators.names, streams.name)
     # commands are held, but the servos are the simulator's own
     record = checked_force(flight_record(aircraft, streams, 0.2, carried, servos=False))
+    record = checked_signs(record, scales=False)  # those of flow angles are causes that can be named
     rates = [1e9 / float(np.median(np.diff(s.arrival.stamp_ns))) for s in streams.by_topic.values()]
     flight = GapFlight(record, rates[0], rates[1], rates[2], source=source)
     return completed_flight(aircraft, replace(flight, command_interval=streams.actuators.interval))

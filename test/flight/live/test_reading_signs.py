@@ -31,10 +31,14 @@ WRONG = [
     ({"q": -1.0, "phi": math.nan, "theta": math.nan}, "q or az: the sign"),
     ({"alpha": -1.0}, "angle of attack: the sign is wrong .* positive with air from below"),
     ({"beta": -1.0}, "sideslip: the sign is wrong .* positive with air from the right"),
-    ({"V": 1.944}, r"true_airspeed: about 1\.9 times .* is it in m/s"),
+    ({"V": 1.944}, r"true_airspeed: about 1\.9 times .* in m/s and rad/s\?"),
     ({"V": 3.6}, r"true_airspeed: about 3\.[4-8] times"),
-    ({"V": 1 / 3.6}, r"true_airspeed: about 0\.3 times"),
-    ({"p": 57.3, "q": 57.3, "r": 57.3}, "p, q, r: over 19 times what the attitude turns; in deg/s"),
+    ({"V": 1.944, "phi": math.nan, "theta": math.nan}, r"true_airspeed or q: about"),
+    ({"V": 1 / 3.6}, r"true_airspeed: about 0\.28 times"),
+    ({"p": 57.3, "q": 57.3, "r": 57.3}, "p, q, r: about 57, 57, 57 times what the attitude turns; in rad/s"),
+    ({"q": 2.0}, r"q: about (1\.9|2) times what the attitude turns"),
+    ({"alpha": 2.0}, "angle of attack: about 2 times what rates and accelerations show; is the scale right"),
+    ({"alpha": 2.0, "beta": 0.5}, r"angle of attack: about 2 times, sideslip: about 0\.(49|5) times"),
 ]
 
 
@@ -52,6 +56,24 @@ def test_a_sound_flight_is_taken_without_a_word() -> None:
 def test_a_wrong_reading_is_named(factors: dict[str, float], said: str) -> None:
     with pytest.raises(InputError, match=f"made: {said}"):
         checked_signs(flown(factors))
+
+
+def test_a_flow_angle_of_another_scale_is_left_for_a_diagnosis_to_name() -> None:
+    record = flown({"alpha": 2.0})
+    with pytest.warns(InputWarning, match="made: angle of attack: about 2 times"):
+        assert checked_signs(record, scales=False) is record
+    with pytest.raises(InputError, match="angle of attack: the sign is wrong"):
+        checked_signs(flown({"alpha": -1.0}), scales=False)
+
+
+@pytest.mark.parametrize("late", [0.1, 0.2, 0.3, 0.4, 0.5])
+def test_air_data_that_come_late_are_not_of_the_wrong_sign(late: float) -> None:
+    """Half a period late, an oscillation is reversed."""
+    record = flown()
+    columns = {name: np.interp(record.time - late, record.time, record[name]) for name in ("V", "alpha", "beta")}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checked_signs(FlightRecord(record.time, {**record.columns, **columns}, "late"))
 
 
 @pytest.mark.parametrize(
