@@ -21,7 +21,6 @@ from sysid_node.dynamics.atmosphere import GRAVITY
 from sysid_node.flight.record import Array
 
 SPAN = 0.5  # s over which the readings are integrated
-LAG = 0.1  # s; five of them are one span
 _LONGEST_STEP = 0.2  # s from sample to sample within a span
 _FEWEST = 20  # degrees of freedom from which on a relation tells
 _NOTHING = 1e-9  # share of a column's power under which what is left of it is rounding
@@ -29,11 +28,12 @@ _MOST = 1.0 - 1e-12  # correlation: Fisher's z has an end
 _READINGS = 13  # of a sample, its time included
 
 #: What is known of each span: how long it is, changes (d_) and integrals. u, v, w: velocity along body x, y, z, m/s.
-_LATER = tuple(f"{change}_{lag}" for lag in range(1, 6) for change in ("d_v", "d_w"))  # flow angles so many LAGs later
+_LAGS = (*range(-5, 0), *range(1, 6))  # tenths of a second, a span at most
+_SHIFTED = tuple(f"{change}_{lag}" for lag in _LAGS for change in ("d_v", "d_w"))  # flow angles so much later
 _COLUMNS = (
     *("time", "d_phi", "d_theta", "d_psi", "d_p", "d_q", "d_r", "d_v", "d_w"),
     *("phi_rate", "theta_rate", "psi_rate", "force_y", "force_z", "qu", "ru", "pv", "pw"),
-    *_LATER,
+    *_SHIFTED,
 )
 _PLACE = {name: i for i, name in enumerate(_COLUMNS)}
 
@@ -90,18 +90,18 @@ class KinematicRelations:
             self._rest = samples
             return
         _, ends = np.unique(samples[:, 0] // SPAN, return_index=True)  # so that pieces of any length give the same
-        if ends.size < 4:  # the last span is not complete, and flow angles up to a span later are looked at
+        if ends.size < 5:  # the last span is not complete, and flow angles up to a span before and after are looked at
             self._rest = samples
             return
-        self._rest = samples[ends[-3] :]
-        spans, known = _spans(samples, ends[:-2])
+        self._rest = samples[ends[-4] :]
+        spans, known = _spans(samples, ends[1:-2])
         self._gram += spans.T @ spans
         self._counts += known.sum(axis=0)
 
-    def late(self, relation: str) -> float:
-        """The largest correlation of "alpha" or "beta" with flow angles that come up to a span late; 0 or more."""
+    def shifted(self, relation: str) -> float:
+        """The largest correlation of "alpha" or "beta" by flow angles that come up to a span late or early."""
         (change,) = RELATIONS[relation].regressor
-        return max(self.agreement(relation, {f"{change}_{lag}": 1.0}).correlation for lag in range(6) if lag) or 0.0
+        return max(self.agreement(relation, {f"{change}_{lag}": 1.0}).correlation for lag in _LAGS)
 
     def agreement(self, relation: str, other: Mapping[str, float] | None = None) -> Agreement:
         """What the flight so far says of a relation, or by an ``other`` regressor; zeros where that is too little."""
@@ -127,20 +127,18 @@ def _spans(samples: Array, ends: NDArray[np.intp]) -> tuple[Array, NDArray[np.bo
 
     Zeros stand for what is not known: they take no part in the sums.
     """
-    time, last = samples[:, 0], int(ends[-1])
+    time, within = samples[:, 0], slice(int(ends[0]), int(ends[-1]) + 1)
     changing, integrands = _columns(samples)
-    steps = np.diff(time[: last + 1])
-    trapezoids = 0.5 * (integrands[1 : last + 1] + integrands[:last]) * steps[:, np.newaxis]
-    flow = changing[:, [_PLACE["d_v"], _PLACE["d_w"]]].T
-    later = [np.interp(time[ends] + lag * LAG, time, angle) for lag in range(1, 6) for angle in flow]
-    changes = np.column_stack([np.diff(changing[ends], axis=0), np.diff(later, axis=1).T])
-    own = changing.shape[1]
-    integrals = np.add.reduceat(trapezoids, ends[:-1])
-    spans = np.column_stack([changes[:, :own], integrals, changes[:, own:]])
+    steps, values, starts = np.diff(time[within]), integrands[within], ends[:-1] - ends[0]
+    trapezoids = 0.5 * (values[1:] + values[:-1]) * steps[:, np.newaxis]
+    velocities = changing[:, [_PLACE["d_v"], _PLACE["d_w"]]].T
+    shifted = [np.interp(time[ends] + 0.1 * lag, time, each) for lag in _LAGS for each in velocities]
+    changes, shifts = np.diff(changing[ends], axis=0), np.diff(shifted, axis=1).T
+    spans = np.column_stack([changes, np.add.reduceat(trapezoids, starts), shifts])
     headings = spans[:, _PLACE["d_psi"]]
     headings -= 2.0 * math.pi * np.round(headings / (2.0 * math.pi))
     moving = np.isfinite(spans[:, [_PLACE["force_z"], _PLACE["qu"]]]).all(axis=1)
-    spans = spans[moving & (np.maximum.reduceat(steps, ends[:-1]) <= _LONGEST_STEP)]
+    spans = spans[moving & (np.maximum.reduceat(steps, starts) <= _LONGEST_STEP)]
     known = np.isfinite(spans)
     return np.where(known, spans, 0.0), known
 

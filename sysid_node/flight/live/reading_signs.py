@@ -68,9 +68,9 @@ class ReadingSigns:
         return Contradictions("", _scale_fault(found), doubt)
 
     def _flow_fault(self, found: Mapping[str, Agreement]) -> str:
-        """Which flow angles have the wrong sign, in words. One that comes late may seem to have it."""
+        """Which flow angles have the wrong sign, in words. One that comes late or early may seem to."""
         wrong = [name for name in _FLOW_ANGLES if _opposite(found[name])]
-        wrong = [name for name in wrong if -found[name].correlation > self._relations.late(name)]
+        wrong = [name for name in wrong if -found[name].correlation > self._relations.shifted(name)]
         sides = {name: f"positive with air from {side}" for name, (_, side) in _FLOW_ANGLES.items()}
         texts = [
             f"{_FLOW_ANGLES[name][0]}: the sign is wrong by rates and accelerations; {sides[name]}" for name in wrong
