@@ -36,7 +36,7 @@ def opposite_estimates(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -
     }
     found = [
         f"{strongest[control]} is {estimates[strongest[control]].value:.3g}, and of the other sign in the aircraft "
-        f"file: is {control} counted the other way? If so, change the sign of its joint's scale"
+        f"file: is {control} counted the other way? If the axes of the rates are right, change its joint's sign"
         for control, factor in factors.items()
         if factor < 0.0
     ]

@@ -72,6 +72,10 @@ def _csv_rows(path: Path, text: str) -> Iterator[_Row]:
     first = next(iter(text.splitlines()), "")
     lines = csv.reader(text.splitlines(), delimiter=";" if ";" in first and "," not in first else ",")
     header = [name.strip().lower() for name in next(lines, [])]
+    if "path" not in header and {"t", "ax", "az"} <= set(header):
+        raise InputError(
+            f"catalogue {path}: is a flight itself; give its folder, or a catalogue that names it by 'path'"
+        )
     _check_keys(header, f"catalogue {path}, line 1")
     if twice := [name for name, count in Counter(header).items() if count > 1]:
         raise InputError(f"catalogue {path}, line 1: column {twice[0]!r} is there twice; keep one")

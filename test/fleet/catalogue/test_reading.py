@@ -120,6 +120,7 @@ def test_addresses_are_expanded_by_fsspec(tmp_path: Path) -> None:
     ("name", "text", "said"),
     [
         ("f.csv", "file,aircraft\na,b\n", "line 1: unknown key 'file'"),
+        ("f.csv", "t,ax,ay,az,p\n0,0,0,-9.8,0\n", "is a flight itself; give its folder, or a catalogue"),
         ("f.csv", "aircraft,tail\na,b\n", "column 'path' is missing"),
         ("f.csv", "path,tail\na,b,c\n", "line 2: has 3 cells for 2 columns"),
         ("f.csv", "path,tail\n", "has no flights"),
