@@ -73,9 +73,7 @@ def _csv_rows(path: Path, text: str) -> Iterator[_Row]:
     lines = csv.reader(text.splitlines(), delimiter=";" if ";" in first and "," not in first else ",")
     header = [name.strip().lower() for name in next(lines, [])]
     if "path" not in header and {"t", "ax", "az"} <= set(header):
-        raise InputError(
-            f"catalogue {path}: is a flight itself; give its folder, or a catalogue that names it by 'path'"
-        )
+        raise InputError(f"catalogue {path}: is a flight itself; give its folder, or a catalogue that names it")
     _check_keys(header, f"catalogue {path}, line 1")
     if twice := [name for name, count in Counter(header).items() if count > 1]:
         raise InputError(f"catalogue {path}, line 1: column {twice[0]!r} is there twice; keep one")
