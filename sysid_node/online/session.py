@@ -91,7 +91,7 @@ class Session:
     @property
     def sign_fault(self) -> str:
         """Which readings have the wrong sign or unit by the others, in words; empty where none has."""
-        return "" if self.force_fault else self.signs.found.fault or self.signs.found.scale
+        return "" if self.force_fault else self.signs.found.fault
 
     @property
     def attitude_fault(self) -> str:
@@ -205,7 +205,7 @@ class Session:
             self.lift.add(moment, *_of_lift(sample))
             self.deflections.add_sample(moment, sample[self._controls])
             if self.signs.wants(moment) and self.signs.add(moment, streaming.stamp_of(self.alignment, moment), sample):
-                self.state.inputs.contradiction = self.signs.found.fault or self.signs.found.scale
+                self.state.inputs.contradiction = self.signs.found.fault
             self._heard = time.monotonic()
             if schedule.due(self.schedule, moment, wait):
                 results.append(self.now())

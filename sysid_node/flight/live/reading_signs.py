@@ -20,6 +20,7 @@ from sysid_node.flight.record import Array, FlightRecord
 
 _CERTAIN = 6.0  # standard deviations, and the size of the correlation, from which on a sign is certain:
 _CLEAR = 0.5  # wind that the aircraft answers correlates readings weakly, and the surer the longer the flight is
+_SHIFTED = 0.15  # by which the correlation is larger from which on an angle of attack comes late or early
 _LIKELY = 3.0  # standard deviations from which on a relation tells which of two readings is wrong
 #: Times the true airspeed from which on its unit is wrong, and the inverse. In knots it is 1.94 times.
 _ANOTHER_UNIT = 1.55
@@ -35,14 +36,15 @@ _TURNS = {
     "q": ("theta", "pitch", "vertical", False),
     "r": ("psi", "yaw", "lateral", False),
 }
-_FLOW_ANGLES = {"alpha": ("angle of attack", "below"), "beta": ("sideslip", "the right")}
+#: By relation: the angle, the side from which air makes it positive, and by how much the correlation of the other sign
+#: must be above that of an angle that comes late or early. Both are alike where it oscillates as fast as alpha does.
+_FLOW_ANGLES = {"alpha": ("angle of attack", "below", 0.15), "beta": ("sideslip", "the right", 0.05)}
 
 
 class Contradictions(NamedTuple):
     """What contradicts the rest, in words; empty where nothing does."""
 
-    fault: str = ""  # signs and units of the rates, the airspeed and the flow angles
-    scale: str = ""  # flow angles that are far too large or too small, which a diagnosis of the gap can name
+    fault: str = ""  # readings from which derivatives are estimated
     doubt: str = ""  # angles of the attitude, from which no derivative is estimated
 
 
@@ -61,32 +63,40 @@ class ReadingSigns:
         """What the flight so far shows. A wrong rate makes other relations wrong, so that it is said alone."""
         found = {name: self._relations.agreement(name) for name in RELATIONS}
         rates, angles = _wrong_turns(found)
-        fault = _rate_fault(found) or _sign_fault(rates) or _airspeed_fault(found) or self._flow_fault(found)
-        if fault:
-            return Contradictions(fault)
+        fault = _rate_fault(found) or _sign_fault(rates) or self._airspeed_fault(found) or self._flow_fault(found)
         doubt = f"{', '.join(angles)} of the attitude: the sign is wrong by rates and accelerations" if angles else ""
-        return Contradictions("", _scale_fault(found), doubt)
+        return Contradictions(fault, "" if fault else doubt)
+
+    def _airspeed_fault(self, found: Mapping[str, Agreement]) -> str:
+        """That the airspeed is in another unit, in words.
+
+        Without vanes the relation is too weak to tell, and with an angle of attack that comes late or early it is none.
+        """
+        seen, known = found["vertical"], found["alpha"] != Agreement()
+        if not known or seen.score < _CERTAIN or max(seen.inverse, seen.slope) < _ANOTHER_UNIT:
+            return ""
+        if self._relations.shifted("alpha") > found["alpha"].correlation + _SHIFTED:
+            return ""
+        what = "true_airspeed" if found["pitch"].score >= _CERTAIN else "true_airspeed or q"
+        times = math.sqrt(seen.inverse / seen.slope)
+        return f"{what}: about {times:.2g} times what accelerations and pitch rate show; in m/s and rad/s?"
 
     def _flow_fault(self, found: Mapping[str, Agreement]) -> str:
         """Which flow angles have the wrong sign, in words. One that comes late or early may seem to."""
-        wrong = [name for name in _FLOW_ANGLES if _opposite(found[name])]
-        wrong = [name for name in wrong if -found[name].correlation > self._relations.shifted(name)]
-        sides = {name: f"positive with air from {side}" for name, (_, side) in _FLOW_ANGLES.items()}
-        texts = [
-            f"{_FLOW_ANGLES[name][0]}: the sign is wrong by rates and accelerations; {sides[name]}" for name in wrong
-        ]
-        return "; ".join(texts)
+        said = "the sign is wrong by rates and accelerations; it is positive with air from"
+        return "; ".join(
+            f"{angle}: {said} {side}"
+            for name, (angle, side, clearer) in _FLOW_ANGLES.items()
+            if _opposite(found[name]) and -found[name].correlation > self._relations.shifted(name) + clearer
+        )
 
-    def check(self, name: str, *, scales: bool = True) -> None:
-        """Raise InputError where readings contradict the rest; warn (InputWarning) where only the attitude does.
-
-        Without ``scales`` it is also a warning where flow angles are too large or too small.
-        """
-        fault, scale, doubt = self.contradictions
-        if fault or (scale and scales):
-            raise InputError(f"{name}: {fault or scale}")
-        for text in filter(None, (scale, doubt)):
-            warnings.warn(f"{name}: {text}", InputWarning, stacklevel=2)
+    def check(self, name: str) -> None:
+        """Raise InputError where readings contradict the rest; warn (InputWarning) where only the attitude does."""
+        fault, doubt = self.contradictions
+        if fault:
+            raise InputError(f"{name}: {fault}")
+        if doubt:
+            warnings.warn(f"{name}: {doubt}", InputWarning, stacklevel=2)
 
 
 class ReadingSignsInFlight:
@@ -160,23 +170,6 @@ def _rate_fault(found: Mapping[str, Agreement]) -> str:
     return f"{', '.join(wrong)}: about {', '.join(wrong.values())} times what the attitude turns; in rad/s?"
 
 
-def _airspeed_fault(found: Mapping[str, Agreement]) -> str:
-    """That the airspeed is in another unit, in words. Without vanes the relation is too weak to tell."""
-    seen, known = found["vertical"], found["alpha"] != Agreement()
-    if not known or seen.score < _CERTAIN or max(seen.inverse, seen.slope) < _ANOTHER_UNIT:
-        return ""
-    what = "true_airspeed" if found["pitch"].score >= _CERTAIN else "true_airspeed or q"
-    times = math.sqrt(seen.inverse / seen.slope)
-    return f"{what}: about {times:.2g} times what accelerations and pitch rate show; in m/s and rad/s?"
-
-
-def _scale_fault(found: Mapping[str, Agreement]) -> str:
-    """That flow angles are far too large or too small, in words."""
-    times = {angle: _times(found[name]) for name, (angle, _) in _FLOW_ANGLES.items()}
-    texts = [f"{angle}: about {factor:.2g} times" for angle, factor in times.items() if factor != 1.0]
-    return f"{', '.join(texts)} what rates and accelerations show; is the scale right?" if texts else ""
-
-
 def _opposite(seen: Agreement) -> bool:
     return seen.score <= -_CERTAIN and seen.correlation <= -_CLEAR
 
@@ -188,7 +181,7 @@ def _times(seen: Agreement) -> float:
     return math.sqrt(seen.inverse / seen.slope)
 
 
-def checked_signs(record: FlightRecord, *, scales: bool = True) -> FlightRecord:
+def checked_signs(record: FlightRecord) -> FlightRecord:
     """The record as it is, its readings' signs checked. Raises and warns as ``ReadingSigns.check``."""
     signs = ReadingSigns()
     missing = np.full(record.time.size, math.nan)
@@ -197,5 +190,5 @@ def checked_signs(record: FlightRecord, *, scales: bool = True) -> FlightRecord:
         for names in (("ax", "ay", "az", "p", "q", "r"), ("V", "alpha", "beta"), ("phi", "theta", "psi"))
     )
     signs.add(record.time, motion, air, attitude)
-    signs.check(record.name, scales=scales)
+    signs.check(record.name)
     return record

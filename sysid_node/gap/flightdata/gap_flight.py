@@ -75,7 +75,7 @@ def load_gap_flight(
     Raises InputError where it is unreadable, lacks a signal or is too short.
     """
     if is_table(path, topics, frame):
-        record = checked_signs(checked_force(read_csv(path)), scales=False)
+        record = checked_signs(checked_force(read_csv(path)))
         rate = 1.0 / float(np.median(np.diff(record.time)))
         return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
     return flight_of_streams(open_streams(path, aircraft, topics, frame), aircraft, str(path), carried)
@@ -85,8 +85,7 @@ def flight_of_streams(streams: Streams, aircraft: Aircraft, source: str = "", ca
     """The flight of recorded messages. Raises InputError where it lacks a signal or is too short."""
     Actuation.of(aircraft).require(streams.actuators.names, streams.name)
     # commands are held, but the servos are the simulator's own
-    record = checked_force(flight_record(aircraft, streams, 0.2, carried, servos=False))
-    record = checked_signs(record, scales=False)  # those of flow angles are causes that can be named
+    record = checked_signs(checked_force(flight_record(aircraft, streams, 0.2, carried, servos=False)))
     rates = [1e9 / float(np.median(np.diff(s.arrival.stamp_ns))) for s in streams.by_topic.values()]
     flight = GapFlight(record, rates[0], rates[1], rates[2], source=source)
     return completed_flight(aircraft, replace(flight, command_interval=streams.actuators.interval))
