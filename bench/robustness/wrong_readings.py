@@ -48,6 +48,8 @@ _MISTAKES: Mapping[str, tuple[Mapping[str, float], str]] = {
     "airspeed in knots": ({"V": 1.944}, "true_airspeed"),
     "airspeed in mph": ({"V": 2.237}, "true_airspeed"),
     "airspeed in km/h": ({"V": 3.6}, "true_airspeed"),
+    "attitude that stands still": (dict.fromkeys(_UNMEASURED, 0.0), ""),
+    "attitude reversed": (dict.fromkeys(_UNMEASURED, -1.0), ""),
 }
 
 

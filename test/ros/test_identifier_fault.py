@@ -8,7 +8,7 @@ from harness import Probe, made_up_streams
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
-from sysid_node.online.session import Due, Session
+from sysid_node.online.session import UNTOLD, Due, Session
 from sysid_node.ros.identifier import Identifier
 
 
@@ -17,10 +17,10 @@ class FaultySession(Session):
 
     fails = False
 
-    def imu(self, stamp_ns: int, values: tuple[float, ...]) -> list[Due]:
+    def imu(self, stamp_ns: int, values: tuple[float, ...], tilt: tuple[float, float] = UNTOLD) -> list[Due]:
         if self.fails:
             return [1 / 0]  # type: ignore[list-item]
-        return super().imu(stamp_ns, values)
+        return super().imu(stamp_ns, values, tilt)
 
 
 @pytest.fixture

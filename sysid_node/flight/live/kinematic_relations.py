@@ -94,7 +94,7 @@ class KinematicRelations:
             self._rest = samples
             return
         self._rest = samples[ends[-4] :]
-        spans, known = _spans(samples, ends[1:-2])
+        spans, known = _spans(_without_still_attitude(samples, ends), ends[1:-2])
         self._gram += spans.T @ spans
         self._counts += known.sum(axis=0)
 
@@ -120,6 +120,15 @@ class KinematicRelations:
             return Agreement()
         correlation = min(max(xy / math.sqrt(xx * yy), -_MOST), _MOST)
         return Agreement(xy / xx, xy / yy, math.atanh(correlation) * math.sqrt(freedom))
+
+
+def _without_still_attitude(samples: Array, ends: NDArray[np.intp]) -> Array:
+    """The samples, the attitude NaN in spans in which it does not change at all: a field that nobody fills in."""
+    angles = samples[ends, 10:12]
+    still = np.append((angles[1:] == angles[:-1]).all(axis=1), False)
+    found = samples.copy()
+    found[np.repeat(still, np.diff(ends, append=len(samples))), 10:] = np.nan
+    return found
 
 
 def _spans(samples: Array, ends: NDArray[np.intp]) -> tuple[Array, NDArray[np.bool_]]:

@@ -24,7 +24,7 @@ _SHIFTED = 0.15  # by which the correlation is larger from which on an angle of 
 _LIKELY = 3.0  # standard deviations from which on a relation tells which of two readings is wrong
 #: Times the true airspeed from which on its unit is wrong, and the inverse. In knots it is 1.94 times.
 _ANOTHER_UNIT = 1.55
-_CLOSE = 0.7  # correlation from which on the factor is believed
+_CLOSE = 0.9  # correlation of an attitude with its rates from which on it is believed
 EVERY = 0.05  # s between the samples that count in flight
 _JUDGED = 5.0  # s from judgement to judgement in flight
 _WAITING = 2000  # IMU messages whose samples may still come
@@ -87,7 +87,9 @@ class ReadingSigns:
         return "; ".join(
             f"{angle}: {said} {side}"
             for name, (angle, side, clearer) in _FLOW_ANGLES.items()
-            if _opposite(found[name]) and -found[name].correlation > self._relations.shifted(name) + clearer
+            if _opposite(found[name])
+            and -found[name].correlation > self._relations.shifted(name) + clearer
+            and (name == "alpha" or _follows(found["roll"]))  # the side force holds the weight, by the bank
         )
 
     def check(self, name: str) -> None:
@@ -135,22 +137,27 @@ class ReadingSignsInFlight:
 
 
 def _wrong_turns(found: Mapping[str, Agreement]) -> tuple[list[str], list[str]]:
-    """The rates whose sign is wrong, and the angles of the attitude; rates where that cannot be told."""
+    """The rates whose sign is wrong, and the angles of the attitude; rates where that cannot be told.
+
+    Pitch is told without the attitude. Where that is wrong in pitch nothing that depends on it is believed.
+    """
     turned = [rate for rate, (_, turn, _, _) in _TURNS.items() if _opposite(found[turn])]
+    if "q" in turned and found["vertical"].score >= _LIKELY:
+        return [], [_TURNS[rate][0] for rate in turned]
     rates, angles = [], []
     for rate in turned:
         angle, _, other, holds = _TURNS[rate]
         score = found[other].score
         told = abs(score) >= _LIKELY and not (other == "lateral" and {"p", "r"} <= set(turned))
-        if not told:
+        if not told and not (rate != "q" and _opposite(found["vertical"])):
             rates.append(f"{rate} or {angle}")
-        elif (score > 0.0) == holds:
+        elif not told or (score > 0.0) == holds:
             rates.append(rate)
         else:
             angles.append(angle)
-    if _opposite(found["vertical"]) and not {"q"} & set(turned):
+    if _opposite(found["vertical"]) and "q" not in turned:
         rates.append("q or az")
-    if _opposite(found["lateral"]) and not {"p", "r"} & set(turned):
+    if _opposite(found["lateral"]) and not {"p", "r"} & set(turned) and _follows(found["roll"]):
         rates.append("r or ay")
     return rates, angles
 
@@ -174,9 +181,13 @@ def _opposite(seen: Agreement) -> bool:
     return seen.score <= -_CERTAIN and seen.correlation <= -_CLEAR
 
 
+def _follows(seen: Agreement) -> bool:
+    return seen.score >= _CERTAIN and seen.correlation >= _CLOSE
+
+
 def _times(seen: Agreement) -> float:
     """How many times too large a reading is by a relation in which it is the regressor; 1 unless it is far off."""
-    if seen.score < _CERTAIN or seen.correlation < _CLOSE or max(seen.inverse, seen.slope) < _ANOTHER_UNIT:
+    if not _follows(seen) or max(seen.inverse, seen.slope) < _ANOTHER_UNIT:
         return 1.0
     return math.sqrt(seen.inverse / seen.slope)
 

@@ -28,6 +28,7 @@ WRONG = [
     ({"q": -1.0}, "q: the sign is wrong"),
     ({"r": -1.0}, r"r( or ay)?: the sign is wrong"),
     ({"q": -1.0, "r": -1.0}, "q, r: the sign is wrong by the other readings; axes are forward, left, up where"),
+    ({"p": -1.0, "q": -1.0, "r": -1.0}, "p, q, r: the sign"),
     ({"q": -1.0, "phi": math.nan, "theta": math.nan}, "q or az: the sign"),
     ({"alpha": -1.0}, "angle of attack: the sign is wrong .* positive with air from below"),
     ({"beta": -1.0}, "sideslip: the sign is wrong .* positive with air from the right"),
@@ -67,9 +68,23 @@ def test_air_data_that_come_late_or_early_are_not_of_the_wrong_sign(late: float)
         checked_signs(FlightRecord(record.time, {**record.columns, **columns}, "late"))
 
 
+def test_an_attitude_that_stands_still_is_none() -> None:
+    """As of a driver that leaves the orientation as it is."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checked_signs(flown({"phi": 0.0, "theta": 0.0, "psi": 0.0}))
+    with pytest.raises(InputError, match="q or az: the sign"):
+        checked_signs(flown({"phi": 0.0, "theta": 0.0, "psi": 0.0, "q": -1.0}))
+
+
 @pytest.mark.parametrize(
     ("factors", "said"),
-    [({"phi": -1.0}, "phi"), ({"theta": -1.0}, "theta"), ({"theta": -1.0, "psi": -1.0}, "theta, psi")],
+    [
+        ({"phi": -1.0}, "phi"),
+        ({"theta": -1.0}, "theta"),
+        ({"theta": -1.0, "psi": -1.0}, "theta, psi"),
+        ({"phi": -1.0, "theta": -1.0, "psi": -1.0}, r"phi, theta(, psi)?"),
+    ],
 )
 def test_an_attitude_of_the_wrong_sign_is_a_warning_alone(factors: dict[str, float], said: str) -> None:
     """No derivative is estimated from it."""
