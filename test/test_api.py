@@ -14,12 +14,16 @@ from short_bags import short_bag
 import sysid_node
 from sysid_node import diagnose, identify, load, replay
 from sysid_node.cli.main import main
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.flight.csv import write_csv
 
 ROOT = Path(__file__).resolve().parents[1]
 BAG = ROOT / "bags" / "cdrw_multistep"
 TRUTH = json.loads((ROOT / "bags" / "cdrw_multistep.truth.json").read_text())["derivatives"]
+
+
+def identify_simply(flight):
+    return identify(flight, "equation_error")
 
 
 @pytest.fixture(scope="module")
@@ -126,6 +130,15 @@ def test_offsets_are_not_excited_where_a_control_does_not_move(flight, tmp_path)
     found = replay(load(tmp_path / "still.csv", "cdrw"), {"publish_rate": 1.0}).final.derivatives
     assert {found[name].status for name in ("CL_0", "CL_de", "Cm_0", "Cm_de")} == {"not excited"}
     assert found["Cl_p"].valid
+
+
+@pytest.mark.parametrize("work", [identify_simply, replay])
+def test_a_surface_that_is_counted_the_other_way_is_said(flight, tmp_path, work):
+    record = flight.record.between(0.0, 30.0)
+    write_csv(tmp_path / "other.csv", replace(record, columns={**record.columns, "de": -record["de"]}))
+    with pytest.warns(InputWarning, match=r"Cm_de is 0\.\d+, .* is elevator counted the other way"):
+        found = work(load(tmp_path / "other.csv", "cdrw"))
+    assert any("counted the other way" in remark for remark in found.run.remarks)
 
 
 def test_without_pandas_one_line_says_so(replayed, monkeypatch):
