@@ -1,9 +1,9 @@
 """How often a reading of the wrong sign or unit is seen: real, bundled and simulated flights, each mistake in turn.
 
-    python -m bench.robustness.wrong_readings [--page docs/results/wrong_readings.md]
+    python -m bench.robustness.wrong_readings [--first 1] [--page docs/results/wrong_readings.md]
 
 A flight is changed as a user may have it, and read as ``sysid replay`` and ``sysid identify`` read it. Flights shorter
-than 13 s, which tell nothing, are left out. ``SYSID_FLIGHTS`` names the folder of the real flights.
+than 15 s, which tell nothing, are left out. ``SYSID_FLIGHTS`` names the folder of the real flights.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from sysid_node.flight.csv import read_csv
 from sysid_node.flight.live.reading_signs import checked_signs
 from sysid_node.flight.record import FlightRecord
 
-_SHORTEST = 13.0  # s
+_SHORTEST = 15.0  # s
 _BAGS = Path(__file__).parents[2] / "bags"
 _AIRCRAFT = ("cdrw", "cdfp", "kestrel")
 _UNMEASURED = {"phi": math.nan, "theta": math.nan, "psi": math.nan}
@@ -56,13 +56,14 @@ _MISTAKES: Mapping[str, tuple[Mapping[str, float], str]] = {
 def main() -> None:
     """Print the table, or put it in a page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--first", type=int, default=1, help="seed of the simulated flights (default: 1)")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     warnings.simplefilter("ignore")
     groups = {"real": list(_real()), "bundled": list(_bundled())}
     with tempfile.TemporaryDirectory() as folder:
         for weather in ("none", "light", "moderate"):
-            groups[f"simulated, turbulence {weather}"] = list(_simulated(Path(folder), weather))
+            groups[f"simulated, turbulence {weather}"] = list(_simulated(Path(folder), weather, args.first))
     rows = [(mistake, *(_share(flights, *_MISTAKES[mistake]) for flights in groups.values())) for mistake in _MISTAKES]
     rows += [
         (
@@ -88,9 +89,9 @@ def _bundled() -> Iterator[FlightRecord]:
         yield load(bag, bag.name[:4]).record
 
 
-def _simulated(folder: Path, weather: str) -> Iterator[FlightRecord]:
+def _simulated(folder: Path, weather: str, first: int) -> Iterator[FlightRecord]:
     for aircraft in _AIRCRAFT:
-        for seed, manoeuvre in enumerate(("3211", "multisine"), 1):
+        for seed, manoeuvre in enumerate(("3211", "multisine"), first):
             words = ("--manoeuvre", manoeuvre, "--duration", "60", "--turbulence", weather)
             bag = flown(folder / f"{aircraft}_{weather}_{manoeuvre}", seed, words, aircraft)
             yield load(bag, aircraft).record

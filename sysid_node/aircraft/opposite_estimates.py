@@ -43,7 +43,7 @@ def opposite_estimates(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -
     found += _as_shares(aircraft, factors)
     side = estimates.get("CY_beta")
     if side is not None and _certain(side) and side.value > 0.0:
-        found.append(f"CY_beta is {side.value:.3g}, and negative for every aircraft: is the sign of ay right?")
+        found.append(f"CY_beta is {side.value:.3g}, and negative for aircraft: is the sign of ay right?")
     return found
 
 

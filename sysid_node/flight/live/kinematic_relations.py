@@ -4,7 +4,8 @@ Over each half second the change of an angle is the integral of its rates, and w
 the change of the air's velocity and what the rotation turns of it (Klein & Morelli, "Aircraft System Identification"
 (2006), ch. 10). Each relation is a regression with one slope that is 1 where all is right, -1 where one of its readings
 has the wrong sign, and a unit's factor where one has another unit. Biases and the arms of the instruments are regressed
-along. Wind and noise reduce the slopes; they do not turn their signs.
+along. Noise and wind reduce the slopes. Wind that the aircraft answers may turn the sign of one, but then the readings
+are hardly correlated.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ _NOTHING = 1e-9  # share of a column's power under which what is left of it is r
 _MOST = 1.0 - 1e-12  # correlation: Fisher's z has an end
 _READINGS = 13  # of a sample, its time included
 
-#: What is known of each span: how long it is, changes (d_) and integrals. u, v, w: velocity along body x, y, z, m/s.
 _LAGS = (*range(-5, 0), *range(1, 6))  # tenths of a second, a span at most
 _SHIFTED = tuple(f"{change}_{lag}" for lag in _LAGS for change in ("d_v", "d_w"))  # flow angles so much later
+#: What is known of each span: how long it is, changes (d_) and integrals. u, v, w: velocity along body x, y, z, m/s.
 _COLUMNS = (
     *("time", "d_phi", "d_theta", "d_psi", "d_p", "d_q", "d_r", "d_v", "d_w"),
     *("phi_rate", "theta_rate", "psi_rate", "force_y", "force_z", "qu", "ru", "pv", "pw"),

@@ -18,9 +18,10 @@ from sysid_node.errors import InputError, InputWarning
 from sysid_node.flight.live.kinematic_relations import RELATIONS, Agreement, KinematicRelations
 from sysid_node.flight.record import Array, FlightRecord
 
-_CERTAIN = 6.0  # standard deviations, and the size of the correlation, from which on a sign is certain:
-_CLEAR = 0.5  # wind that the aircraft answers correlates readings weakly, and the surer the longer the flight is
-_SHIFTED = 0.15  # by which the correlation is larger from which on an angle of attack comes late or early
+_CERTAIN = 6.0  # standard deviations from zero from which on the sign of a correlation is certain
+#: Size of the correlation that a sign needs as well: that of wind is small, and becomes certain in a long flight.
+_CLEAR = 0.5
+_MISTIMED = 0.15  # by how much another time must correlate better before an angle of attack counts as late or early
 _LIKELY = 3.0  # standard deviations from which on a relation tells which of two readings is wrong
 #: Times the true airspeed from which on its unit is wrong, and the inverse. In knots it is 1.94 times.
 _ANOTHER_UNIT = 1.55
@@ -75,7 +76,7 @@ class ReadingSigns:
         seen, known = found["vertical"], found["alpha"] != Agreement()
         if not known or seen.score < _CERTAIN or max(seen.inverse, seen.slope) < _ANOTHER_UNIT:
             return ""
-        if self._relations.shifted("alpha") > found["alpha"].correlation + _SHIFTED:
+        if self._relations.shifted("alpha") > found["alpha"].correlation + _MISTIMED:
             return ""
         what = "true_airspeed" if found["pitch"].score >= _CERTAIN else "true_airspeed or q"
         times = math.sqrt(seen.inverse / seen.slope)
@@ -164,7 +165,7 @@ def _wrong_turns(found: Mapping[str, Agreement]) -> tuple[list[str], list[str]]:
 
 def _sign_fault(rates: Sequence[str]) -> str:
     """That rates have the wrong sign, in words."""
-    axes = "axes are forward, left, up where body_frame is flu, and forward, right, down where it is frd"
+    axes = "axes are forward, left, up where body_frame is flu, else forward, right, down"
     return f"{', '.join(rates)}: the sign is wrong by the other readings; {axes}" if rates else ""
 
 

@@ -76,6 +76,11 @@ def test_what_is_not_measured_tells_nothing(missing: tuple[str, ...], told: set[
     assert {name for name in RELATIONS if found.agreement(name) != Agreement()} == told
 
 
+def test_an_attitude_that_stands_still_tells_nothing() -> None:
+    found = relations({"phi": 0.0, "theta": 0.0, "psi": 0.0})
+    assert {name for name in RELATIONS if found.agreement(name) != Agreement()} == {"vertical", "alpha"}
+
+
 def test_a_short_flight_tells_nothing() -> None:
     found = relations(seconds=8.0)
     assert all(found.agreement(name) == Agreement() for name in RELATIONS)

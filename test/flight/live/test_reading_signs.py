@@ -68,6 +68,38 @@ def test_air_data_that_come_late_or_early_are_not_of_the_wrong_sign(late: float)
         checked_signs(FlightRecord(record.time, {**record.columns, **columns}, "late"))
 
 
+def changed(flight: FlightRecord, **columns: np.ndarray) -> FlightRecord:
+    return FlightRecord(flight.time, {**flight.columns, **columns}, "changed")
+
+
+@pytest.mark.parametrize(
+    ("bag", "late"), [("cdrw_multistep", 0.5), ("cdrw_near_stall", 0.3), ("cdrw_near_stall", -0.3)]
+)
+def test_bundled_flights_with_air_data_late_or_early_are_taken(bag: str, late: float) -> None:
+    """Without a look at other times, the first shows a reversed sideslip and the others an airspeed in another unit."""
+    flight = load_flight_record(ROOT / "bags" / bag, load_aircraft(bag[:4]))
+    shifted = {name: np.interp(flight.time - late, flight.time, flight[name]) for name in ("V", "alpha", "beta")}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checked_signs(changed(flight, **shifted))
+
+
+def test_a_reversed_attitude_of_a_bundled_flight_is_a_warning_alone() -> None:
+    flight = load_flight_record(ROOT / "bags" / "cdrw_multistep", load_aircraft("cdrw"))
+    with pytest.warns(InputWarning, match="phi, theta, psi of the attitude: the sign is wrong"):
+        checked_signs(changed(flight, **{name: -flight[name] for name in ("phi", "theta", "psi")}))
+
+
+def test_a_weak_correlation_shows_no_sign_however_long_the_flight() -> None:
+    """As of gusts that the aircraft answers: a fifth of the sideslip is reversed, the rest is noise."""
+    time, columns = readings(600.0)
+    noise = np.random.default_rng(2).normal(0.0, 0.05, time.size)
+    record = FlightRecord(time, {**columns, "beta": noise - 0.2 * columns["beta"]}, "long")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checked_signs(record)
+
+
 def test_an_attitude_that_stands_still_is_none() -> None:
     """As of a driver that leaves the orientation as it is."""
     with warnings.catch_warnings():
