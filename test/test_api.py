@@ -141,6 +141,19 @@ def test_a_surface_that_is_counted_the_other_way_is_said(flight, tmp_path, work)
     assert any("counted the other way" in remark for remark in found.run.remarks)
 
 
+def test_a_gap_is_not_asked_for_with_a_surface_that_is_counted_the_other_way(flight, tmp_path, capsys):
+    """Neither as a real nor as a simulated flight; `sysid check` says so before."""
+    record = flight.record.between(0.0, 30.0)
+    other = tmp_path / "other.csv"
+    write_csv(other, replace(record, columns={**record.columns, "de": -record["de"]}))
+    turned, told = load(other, "cdrw"), r"other\.csv: Cm_de is 0\.\d+, .* is elevator counted the other way"
+    for flights, simulated in ((turned, ()), (load(BAG, "cdrw"), turned)):
+        with pytest.raises(InputError, match=told):
+            diagnose(flights, simulated=simulated)
+    assert main(["check", str(other), "--aircraft", "cdrw"]) == 0
+    assert "gap: no: Cm_de is 0." in " ".join(capsys.readouterr().out.split())
+
+
 def test_without_pandas_one_line_says_so(replayed, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match="to_pandas needs pandas, which is not installed: pip install pandas"):

@@ -28,27 +28,31 @@ class _Estimate(Protocol):
 
 def opposite_estimates(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
     """What valid estimates show, a sentence each; none where nothing is wrong."""
-    strongest = {control.name: _strongest_moment(aircraft, control) for control in aircraft.controls.values()}
-    factors = {
-        control: estimates[name].value / aircraft.derivatives[name].value
-        for control, name in strongest.items()
-        if _certain(estimates.get(name))
-    }
-    found = [
-        f"{strongest[control]} is {estimates[strongest[control]].value:.3g}, and of the other sign in the aircraft "
-        f"file: is {control} counted the other way? If the axes of the rates are right, change its joint's sign"
-        for control, factor in factors.items()
+    return [*reversed_controls(aircraft, estimates), *other_readings(aircraft, estimates)]
+
+
+def reversed_controls(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
+    """Controls that are counted the other way, a sentence each."""
+    return [
+        f"{name} is {estimates[name].value:.3g}, and of the other sign in the aircraft file: is {control} counted the "
+        "other way? If the axes of the rates are right, change its joint's sign"
+        for control, (name, factor) in _factors(aircraft, estimates).items()
         if factor < 0.0
     ]
-    found += _as_shares(aircraft, factors)
+
+
+def other_readings(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
+    """Positions from -1 to 1, and a side force of the wrong sign, a sentence each."""
+    found = _positions_as_shares(aircraft, estimates)
     side = estimates.get("CY_beta")
     if side is not None and _certain(side) and side.value > 0.0:
         found.append(f"CY_beta is {side.value:.3g}, and negative for aircraft: is the sign of ay right?")
     return found
 
 
-def _as_shares(aircraft: Aircraft, factors: Mapping[str, float]) -> list[str]:
-    """What is said where all ``factors``, estimates by the values of the file, are as of positions from -1 to 1."""
+def _positions_as_shares(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
+    """The sentence that is said where derivatives by all controls are as of positions from -1 to 1."""
+    factors = {control: factor for control, (_, factor) in _factors(aircraft, estimates).items()}
     limits = {name: aircraft.controls[name].limit for name in factors}
     if len(factors) < _FEWEST or not all(
         limit and abs(abs(factors[name]) / limit - 1.0) < _ALIKE for name, limit in limits.items()
@@ -59,6 +63,16 @@ def _as_shares(aircraft: Aircraft, factors: Mapping[str, float]) -> list[str]:
         f"derivatives by {', '.join(factors)} are {times} times those of the aircraft file, as the limits in rad are: "
         "are the positions from -1 to 1? If so, multiply the joints' scales by the limits"
     ]
+
+
+def _factors(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> dict[str, tuple[str, float]]:
+    """By control its strongest derivative, where its sign is certain, and the estimate by the value of the file."""
+    strongest = {control.name: _strongest_moment(aircraft, control) for control in aircraft.controls.values()}
+    return {
+        control: (name, estimates[name].value / aircraft.derivatives[name].value)
+        for control, name in strongest.items()
+        if _certain(estimates.get(name))
+    }
 
 
 def _strongest_moment(aircraft: Aircraft, control: Control) -> str:

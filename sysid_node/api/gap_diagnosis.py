@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from sysid_node.aircraft.model import Derivative
+from sysid_node.aircraft.model import Aircraft, Derivative
 from sysid_node.api.compiled_programs import release_compiled_programs
 from sysid_node.api.data_frames import data_frame
 from sysid_node.api.flight_file import FlightFile, flight_list, read_alike, refuse_other_aircraft
@@ -20,7 +20,8 @@ from sysid_node.gap.correction import corrected_aircraft
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.diagnose import diagnose as diagnose_flights
 from sysid_node.gap.document import document
-from sysid_node.gap.flightdata.gap_flight import load_gap_flight
+from sysid_node.gap.flightdata.gap_flight import GapFlight, load_gap_flight
+from sysid_node.gap.flightdata.opposite_readings import check_directions
 from sysid_node.gap.reflying import InSimulator, fly_in, reflown_content
 from sysid_node.report.drawing.plotly_figure import plotly_figure
 from sysid_node.report.files.gap_folder import UNFINISHED, write_gap
@@ -128,8 +129,8 @@ def diagnose(
     ``actuators``: what the actuators' messages are, "commands", "positions", or "auto": told from those of all flights.
 
     Raises InputError where ``actuators`` is no such word, the aircraft file has no tolerances, a flight cannot be read,
-    is fitted and held out at once, or shows no motion; where the simulator's model cannot be read or is another
-    aircraft's; and where the simulated flights do not suffice.
+    is fitted and held out at once, shows no motion, or a surface that is counted the other way than in the file; where
+    the simulator's model cannot be read or is another aircraft's; and where the simulated flights do not suffice.
     """
     flights, held, of_simulation = (
         flight_list(given, called)
@@ -150,7 +151,9 @@ def diagnose(
             read_alike(
                 group,
                 actuators,
-                lambda f, carried: load_gap_flight(f.path, aircraft, f.topics, f.body_frame, carried),
+                lambda f, carried: _checked(
+                    aircraft, load_gap_flight(f.path, aircraft, f.topics, f.body_frame, carried)
+                ),
                 lambda flight: flight.record.commanded,
             )
             for group in ([*flights, *held], of_simulation)
@@ -164,3 +167,9 @@ def diagnose(
         return GapDiagnosis(found, warnings=tuple(noted))
     report(0.99, f"the held-out commands in {theirs.label}")
     return GapDiagnosis(found, fly_in(theirs, found), tuple(noted))
+
+
+def _checked(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
+    """The flight, once it is known which way its surfaces are counted."""
+    check_directions(aircraft, flight)
+    return flight

@@ -144,8 +144,9 @@ def _identified(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFram
 
 def _diagnosed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame) -> None:
     from sysid_node.gap.flightdata.gap_flight import load_gap_flight  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.gap.flightdata.opposite_readings import check_directions  # noqa: PLC0415  # JAX
 
-    load_gap_flight(path, aircraft, topics, frame)
+    check_directions(aircraft, load_gap_flight(path, aircraft, topics, frame))
 
 
 def verdicts(found: LogSurvey, refused: Refusals, *, aircraft_known: bool) -> dict[str, str]:

@@ -1,0 +1,127 @@
+"""How often `sysid gap` sees a surface that is counted the other way: real, bundled and simulated flights.
+
+    python -m bench.robustness.opposite_surfaces [--first 1] [--page docs/results/wrong_readings.md]
+
+The flights are changed as a user may have them. Real ones are the parts of records of ``bench.gap.spikes``, with the
+aircraft files that are believed there; ``SYSID_FLIGHTS`` names their folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import tempfile
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bench.gap.spikes import gap_flight
+from bench.pages import publish, table
+from bench.speed.diagnosis import flown
+from bench.spikes.records import FLIGHTS, belief, part
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputError, InputWarning
+from sysid_node.flight.record import FlightRecord
+from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight, load_gap_flight
+from sysid_node.gap.flightdata.opposite_readings import check_directions
+
+_BAGS = Path(__file__).parents[2] / "bags"
+_AIRCRAFT = ("cdrw", "cdfp", "kestrel")
+_SURFACES = ("de", "da", "dr")
+_NO_VANES = {"alpha": math.nan, "beta": math.nan}
+_LATE = (0.1, 0.2, 0.4)  # s
+
+#: The factors of the readings, by what is wrong.
+_MISTAKES: Mapping[str, Mapping[str, float]] = {
+    "nothing": {},
+    "nothing, without vanes": _NO_VANES,
+    "elevator reversed": {"de": -1.0},
+    "aileron reversed": {"da": -1.0},
+    "rudder reversed": {"dr": -1.0},
+    "all surfaces reversed": dict.fromkeys(_SURFACES, -1.0),
+    "all surfaces reversed, without vanes": {**dict.fromkeys(_SURFACES, -1.0), **_NO_VANES},
+    "lateral accelerometer reversed": {"ay": -1.0},
+}
+
+_Known = tuple[Aircraft, GapFlight]
+
+
+def main() -> None:
+    """Print the table, or put it in a page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--first", type=int, default=1, help="seed of the simulated flights (default: 1)")
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
+    args = parser.parse_args()
+    warnings.simplefilter("ignore")
+    groups = {"real": list(_real()), "bundled": list(_bundled())}
+    with tempfile.TemporaryDirectory() as folder:
+        for weather in ("none", "light", "moderate"):
+            groups[f"simulated, turbulence {weather}"] = list(_simulated(Path(folder), weather, args.first))
+    rows = [(wrong, *(_count(flights, factors) for flights in groups.values())) for wrong, factors in _MISTAKES.items()]
+    rows.append(("positions from -1 to 1", *(_count(flights, None) for flights in groups.values())))
+    rows += [
+        (f"surfaces act {late:g} s late", *(_count(flights, {}, late) for flights in groups.values())) for late in _LATE
+    ]
+    heads = ("what is wrong", *(f"{name} ({len(flights)})" for name, flights in groups.items()))
+    publish("bench/robustness/opposite_surfaces.py", table(heads, rows), args.page)
+
+
+def _real() -> Iterator[_Known]:
+    folder = Path(os.environ.get("SYSID_FLIGHTS", ""))
+    for name, flight in FLIGHTS.items() if folder.name else ():
+        aircraft = belief(folder, flight)
+        for span in dict.fromkeys((*flight.fitted, *flight.held)):
+            yield aircraft, gap_flight(aircraft, part(folder, flight, span), name)
+
+
+def _bundled() -> Iterator[_Known]:
+    for bag in sorted(path for path in _BAGS.glob("cd*_*") if path.is_dir()):
+        aircraft = load_aircraft(bag.name[:4])
+        yield aircraft, load_gap_flight(bag, aircraft, None, "flu")
+
+
+def _simulated(folder: Path, weather: str, first: int) -> Iterator[_Known]:
+    for name in _AIRCRAFT:
+        aircraft = load_aircraft(name)
+        for seed, manoeuvre in enumerate(("3211", "multisine"), first):
+            words = ("--manoeuvre", manoeuvre, "--duration", "60", "--turbulence", weather)
+            bag = flown(folder / f"{name}_{weather}_{manoeuvre}", seed, words, name)
+            yield aircraft, load_gap_flight(bag, aircraft, None, "flu")
+
+
+def _count(flights: list[_Known], factors: Mapping[str, float] | None, late: float = 0.0) -> str:
+    """How many flights are refused or warned of, with their readings changed; no factors: positions from -1 to 1."""
+    return str(sum(_refused(aircraft, flight, factors, late) for aircraft, flight in flights))
+
+
+def _refused(aircraft: Aircraft, flight: GapFlight, factors: Mapping[str, float] | None, late: float) -> bool:
+    limits = {each.symbol: each.limit for each in aircraft.controls.values() if each.limit}
+    factors = {name: 1.0 / limit for name, limit in limits.items()} if factors is None else factors
+    record = _early(flight.record, late)
+    columns = dict(record.columns)
+    columns |= {name: factor * columns[name] for name, factor in factors.items() if name in columns}
+    changed = replace(flight, record=replace(record, columns=columns), inferred=(), history=None)
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always", InputWarning)
+        try:
+            check_directions(aircraft, completed_flight(aircraft, changed))
+        except InputError as error:
+            return "counted the other way" in str(error)
+    said = [str(each.message) for each in warned]
+    return any("from -1 to 1" in text or "sign of ay" in text for text in said)
+
+
+def _early(record: FlightRecord, seconds: float) -> FlightRecord:
+    """The record with surfaces that are recorded so long before they act."""
+    columns = dict(record.columns)
+    columns |= {name: np.interp(record.time + seconds, record.time, columns[name]) for name in _SURFACES}
+    return replace(record, columns=columns)
+
+
+if __name__ == "__main__":
+    main()
