@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sysid_node.online import status
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.estimates.current_solution import CurrentSolution
-from sysid_node.online.regression import least_squares, normal_equations
+from sysid_node.online.regression import damping, least_squares, normal_equations
 from sysid_node.online.regression.gust_correlation import MOMENTS
 from sysid_node.online.regression.least_squares import student_95
 from sysid_node.online.regression.normal_equations import ModelStructure
@@ -112,7 +112,7 @@ def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
     biased = lag.biased[table.unknown, c] & ~table.offset
     objections[biased] = [words.code(f"{lag.lagging_control[i]} not on time") for i in c[biased].tolist()]
     solved = state.equations.structure
-    for symbol, axis in _felt_at_another_time(state, latest):
+    for symbol, axis in (*_felt_at_another_time(state, latest), *_motion_before_its_cause(state, latest)):
         objections[axis[c]] = words.code(f"{symbol} not on time")
     for symbol in _ahead_of_commands(state, latest):
         objections[_with_control(solved, symbol)[c] & ~table.offset] = words.code(f"{symbol} not on time")
@@ -143,6 +143,19 @@ def _felt_at_another_time(state: EstimatorState, latest: SegmentSolution) -> lis
         if structure.coefficients[i] in MOMENTS and lag.biased[belongs[:, i], i].all():
             found.append((symbol, _with_control(structure, symbol) & (structure.block == structure.block[i])))
     return found
+
+
+def _motion_before_its_cause(state: EstimatorState, latest: SegmentSolution) -> list[tuple[str, Flags]]:
+    """The controls whose servos seem slower than the motion that follows them, and the coefficients of their axis."""
+    structure, found = state.equations.structure, latest.systematic
+    if found is None:
+        return []
+    variance = latest.uncertainty.covariance.diagonal(axis1=1, axis2=2) + found.variance[:, :-1]
+    theta = latest.solution.theta + found.correction[:, :-1].T
+    return [
+        (symbol, _with_control(structure, symbol) & (structure.block == structure.block[c]))
+        for c, symbol in damping.amplified(structure, theta, variance.T).items()
+    ]
 
 
 def _with_control(structure: ModelStructure, symbol: str) -> Flags:

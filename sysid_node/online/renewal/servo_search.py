@@ -12,6 +12,8 @@ several points). Both solutions are then weighed by
 with the same noise for both. Of the derivatives' errors Student's distribution with few degrees of freedom is believed,
 for a file is now and then far off. If the other solution is surely more probable, it is taken. If neither surely is,
 the intervals reach to both: the estimate is that of a mixture (McLachlan & Peel, "Finite Mixture Models", 2000).
+
+A solution in which a rotation amplifies itself is none (``regression.damping``).
 """
 
 from __future__ import annotations
@@ -21,7 +23,9 @@ from collections import deque
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from sysid_node.online.regression import damping
 from sysid_node.online.renewal import segment_solution, servo_steps
 from sysid_node.online.renewal.segment_information import measure_segment
 from sysid_node.online.state import ChangeWatch, EstimatorState, Steps, current_lines
@@ -30,11 +34,14 @@ from sysid_node.online.systematic.consider import Fit
 from sysid_node.online.systematic.estimation import AlternativeSolution, SystematicErrors
 from sysid_node.online.systematic.imperfections import CURVATURE
 
+Array = NDArray[np.float64]
+
 FIRST, GROWTH = 8.0, 1.3  # s of data with which the first other solution is tried, and by what they grow to the next
 #: The same where deflections may be positions as well as commands: few data tell a late servo from a slow motion, and
 #: positions, after which no servo comes, are as probable.
 FIRST_OF_EITHER = 20.0
 LATE, BETWEEN = 0.12, 0.06  # s: where a servo is taken to be that is nearer to zero than the second
+PROMPT = 0.02  # s: a servo that is later than this may also be taken to be on time
 STEPS = 4  # at most, from there
 SURELY = 2.0  # difference of -2 log p with which a solution is taken for another
 APART = 1.0  # standard errors by which a servo must differ between two solutions to make them two
@@ -58,6 +65,12 @@ def try_another_solution(state: EstimatorState) -> Steps[None]:
     other = segment_solution.last_errors(trial) if trial is not None else None
     if trial is None or other is None or not _apart(other, found, int(imperfect.timed[control]), control):
         return
+    here, there = _amplified(state, found), _amplified(trial, other)
+    if there - here:
+        return
+    if here - there:
+        yield from _take(state, trial)
+        return
     less = _improbability(state, found, found.considered.fit, other.considered.fit) - _improbability(
         trial, other, other.considered.fit, found.considered.fit
     )
@@ -80,7 +93,7 @@ def _elsewhere(state: EstimatorState, found: SystematicErrors, control: int) -> 
         finished=replace(state.finished, in_window=deque()),
         changes=ChangeWatch([]),
     )
-    there = LATE if late[at] < BETWEEN else 0.0
+    there = _other_side(float(late[at]), state.search.tried // imperfect.unknown.size)
     by_lateness, by_curvature = np.zeros(late.size), np.zeros(late.size)
     by_lateness[at] = there - late[at]
     by_curvature[at] = CURVATURE * there**2 - state.controls.servos.curvature[at]
@@ -106,6 +119,13 @@ def _elsewhere(state: EstimatorState, found: SystematicErrors, control: int) -> 
     return trial
 
 
+def _other_side(lateness: float, tried: int) -> float:
+    """Where (s) a servo is taken to be. One that is neither late nor prompt is so by turns."""
+    if lateness >= BETWEEN or (lateness > PROMPT and tried % 2 == 0):
+        return 0.0
+    return LATE
+
+
 def _apart(one: SystematicErrors, other: SystematicErrors, place: int, control: int) -> bool:
     """Whether these are two solutions: a servo differs by more than its error."""
     by = abs(float(one.servos.lateness[place] - other.servos.lateness[place]))
@@ -114,15 +134,26 @@ def _apart(one: SystematicErrors, other: SystematicErrors, place: int, control: 
 
 def _improbability(state: EstimatorState, found: SystematicErrors, own: Fit, other: Fit) -> float:
     """-2 log p of a solution but for a constant, with the lesser noise of both fits."""
-    latest = state.latest
-    assert latest is not None
     noise = np.where(other.noise > 0.0, np.minimum(own.noise, other.noise), 0.0)
     expected, precision = state.model.prior  # (P, C)
     told = (precision > 0.0) & (state.equations.structure.belongs > 0.0)
-    variance = latest.uncertainty.covariance.diagonal(axis1=1, axis2=2).T + found.variance[:, :-1].T
-    off = latest.solution.theta + found.correction[:, :-1].T - expected
+    theta, variance = _estimates(state, found)
+    off = theta - expected
     squares = np.where(told, off * off / (1.0 / np.where(told, precision, 1.0) + np.maximum(variance, 0.0)), 0.0)
     return own.cost(replace(own, noise=noise)) + float((FREEDOM + 1.0) * np.log1p(squares / FREEDOM).sum())
+
+
+def _estimates(state: EstimatorState, found: SystematicErrors) -> tuple[Array, Array]:
+    """The corrected estimates and their variances, each (P, C)."""
+    latest = state.latest
+    assert latest is not None
+    statistical = latest.uncertainty.covariance.diagonal(axis1=1, axis2=2)
+    return latest.solution.theta + found.correction[:, :-1].T, (statistical + found.variance[:, :-1]).T
+
+
+def _amplified(state: EstimatorState, found: SystematicErrors) -> set[int]:
+    """The coefficients whose motion would amplify itself."""
+    return set(damping.amplified(state.equations.structure, *_estimates(state, found)))
 
 
 def _take(state: EstimatorState, trial: EstimatorState) -> Steps[None]:
