@@ -13,7 +13,7 @@ with the same noise for both. Of the derivatives' errors Student's distribution 
 for a file is now and then far off. If the other solution is surely more probable, it is taken. If neither surely is,
 the intervals reach to both: the estimate is that of a mixture (McLachlan & Peel, "Finite Mixture Models", 2000).
 
-A solution in which a rotation amplifies itself is none (``regression.damping``).
+A solution in which a rotation amplifies itself (``regression.damping``) is less probable than any other.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from collections import deque
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sysid_node.online.regression import damping
 from sysid_node.online.renewal import segment_solution, servo_steps
@@ -33,8 +32,6 @@ from sysid_node.online.systematic import estimation
 from sysid_node.online.systematic.consider import Fit
 from sysid_node.online.systematic.estimation import AlternativeSolution, SystematicErrors
 from sysid_node.online.systematic.imperfections import CURVATURE
-
-Array = NDArray[np.float64]
 
 FIRST, GROWTH = 8.0, 1.3  # s of data with which the first other solution is tried, and by what they grow to the next
 #: The same where deflections may be positions as well as commands: few data tell a late servo from a slow motion, and
@@ -47,6 +44,7 @@ SURELY = 2.0  # difference of -2 log p with which a solution is taken for anothe
 APART = 1.0  # standard errors by which a servo must differ between two solutions to make them two
 FREEDOM = 4.0  # degrees of freedom of Student's distribution of a derivative about the aircraft file's
 NEGLIGIBLE = 1e-3  # probability
+IMPOSSIBLE = 1e6  # -2 log p of a rotation that amplifies itself
 
 
 def try_another_solution(state: EstimatorState) -> Steps[None]:
@@ -64,12 +62,6 @@ def try_another_solution(state: EstimatorState) -> Steps[None]:
     trial = yield from _elsewhere(state, found, control)
     other = segment_solution.last_errors(trial) if trial is not None else None
     if trial is None or other is None or not _apart(other, found, int(imperfect.timed[control]), control):
-        return
-    here, there = _amplified(state, found), _amplified(trial, other)
-    if there - here:
-        return
-    if here - there:
-        yield from _take(state, trial)
         return
     less = _improbability(state, found, found.considered.fit, other.considered.fit) - _improbability(
         trial, other, other.considered.fit, found.considered.fit
@@ -134,26 +126,18 @@ def _apart(one: SystematicErrors, other: SystematicErrors, place: int, control: 
 
 def _improbability(state: EstimatorState, found: SystematicErrors, own: Fit, other: Fit) -> float:
     """-2 log p of a solution but for a constant, with the lesser noise of both fits."""
+    latest = state.latest
+    assert latest is not None
     noise = np.where(other.noise > 0.0, np.minimum(own.noise, other.noise), 0.0)
     expected, precision = state.model.prior  # (P, C)
     told = (precision > 0.0) & (state.equations.structure.belongs > 0.0)
-    theta, variance = _estimates(state, found)
+    variance = latest.uncertainty.covariance.diagonal(axis1=1, axis2=2).T + found.variance[:, :-1].T
+    theta = latest.solution.theta + found.correction[:, :-1].T
     off = theta - expected
     squares = np.where(told, off * off / (1.0 / np.where(told, precision, 1.0) + np.maximum(variance, 0.0)), 0.0)
-    return own.cost(replace(own, noise=noise)) + float((FREEDOM + 1.0) * np.log1p(squares / FREEDOM).sum())
-
-
-def _estimates(state: EstimatorState, found: SystematicErrors) -> tuple[Array, Array]:
-    """The corrected estimates and their variances, each (P, C)."""
-    latest = state.latest
-    assert latest is not None
-    statistical = latest.uncertainty.covariance.diagonal(axis1=1, axis2=2)
-    return latest.solution.theta + found.correction[:, :-1].T, (statistical + found.variance[:, :-1]).T
-
-
-def _amplified(state: EstimatorState, found: SystematicErrors) -> set[int]:
-    """The coefficients whose motion would amplify itself."""
-    return set(damping.amplified(state.equations.structure, *_estimates(state, found)))
+    amplified = damping.amplified(state.equations.structure, theta, variance)
+    of_derivatives = float((FREEDOM + 1.0) * np.log1p(squares / FREEDOM).sum())
+    return own.cost(replace(own, noise=noise)) + of_derivatives + IMPOSSIBLE * len(amplified)
 
 
 def _take(state: EstimatorState, trial: EstimatorState) -> Steps[None]:

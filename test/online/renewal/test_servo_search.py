@@ -60,17 +60,18 @@ def test_deflections_that_may_be_positions_or_commands_are_no_late_commands() ->
         assert estimate.lower < aircraft.derivatives[name].value < estimate.upper
 
 
-def test_a_servo_is_not_so_late_that_the_roll_would_amplify_itself() -> None:
-    """Steps alone end where the aileron is 97 +- 10 ms late; then ``Cl_p`` is 6.5 standard errors off, and positive.
+@pytest.mark.parametrize("seed", [30, 47])
+def test_a_servo_is_not_so_late_that_the_roll_would_amplify_itself(seed: int) -> None:
+    """Steps alone end where the aileron is 100 +- 10 ms late; then ``Cl_p`` is 6.5 standard errors off, and positive.
 
     A file that is off within its tolerances, light turbulence and no vanes leave this minimum as deep as the right one.
+    In the first flight a prompt aileron is tried from 40 ms, in the second from 100 ms.
     """
-    seed = 30
     batch = fly("cdrw", Setting("light turbulence", "light", autopilot=False), [seed])
     batch.samples[..., ANGLES] = np.nan
     found = run(drawn(load_aircraft("cdrw"), seed), OnlineSettings(), batch.time, batch.samples[0], batch.time[-1:])[-1]
     truth = load_aircraft("cdrw").derivatives
-    assert found.servos["aileron"].lower < 0.0 < found.servos["aileron"].upper
+    assert found.servos["aileron"].value < 0.08
     for name in ("Cl_beta", "Cl_p", "Cl_da"):
         assert found.derivatives[name].lower < truth[name].value < found.derivatives[name].upper
 
