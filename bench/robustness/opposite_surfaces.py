@@ -8,10 +8,8 @@ aircraft files that are believed there; ``SYSID_FLIGHTS`` names their folder.
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
-import tempfile
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -21,7 +19,7 @@ import numpy as np
 
 from bench.gap.spikes import gap_flight
 from bench.pages import publish, table
-from bench.speed.diagnosis import flown
+from bench.robustness.flights import arguments, grouped
 from bench.spikes.records import FLIGHTS, belief, part
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
@@ -30,8 +28,6 @@ from sysid_node.flight.record import FlightRecord
 from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight, load_gap_flight
 from sysid_node.gap.flightdata.opposite_readings import check_directions
 
-_BAGS = Path(__file__).parents[2] / "bags"
-_AIRCRAFT = ("cdrw", "cdfp", "kestrel")
 _SURFACES = ("de", "da", "dr")
 _NO_VANES = {"alpha": math.nan, "beta": math.nan}
 _LATE = (0.1, 0.2, 0.4)  # s
@@ -53,15 +49,9 @@ _Known = tuple[Aircraft, GapFlight]
 
 def main() -> None:
     """Print the table, or put it in a page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--first", type=int, default=1, help="seed of the simulated flights (default: 1)")
-    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
-    args = parser.parse_args()
+    args = arguments(__doc__)
     warnings.simplefilter("ignore")
-    groups = {"real": list(_real()), "bundled": list(_bundled())}
-    with tempfile.TemporaryDirectory() as folder:
-        for weather in ("none", "light", "moderate"):
-            groups[f"simulated, turbulence {weather}"] = list(_simulated(Path(folder), weather, args.first))
+    groups = grouped(_real(), _known, args.first)
     rows = [(wrong, *(_count(flights, factors) for flights in groups.values())) for wrong, factors in _MISTAKES.items()]
     rows.append(("positions from -1 to 1", *(_count(flights, None) for flights in groups.values())))
     rows += [
@@ -79,19 +69,9 @@ def _real() -> Iterator[_Known]:
             yield aircraft, gap_flight(aircraft, part(folder, flight, span), name)
 
 
-def _bundled() -> Iterator[_Known]:
-    for bag in sorted(path for path in _BAGS.glob("cd*_*") if path.is_dir()):
-        aircraft = load_aircraft(bag.name[:4])
-        yield aircraft, load_gap_flight(bag, aircraft, None, "flu")
-
-
-def _simulated(folder: Path, weather: str, first: int) -> Iterator[_Known]:
-    for name in _AIRCRAFT:
-        aircraft = load_aircraft(name)
-        for seed, manoeuvre in enumerate(("3211", "multisine"), first):
-            words = ("--manoeuvre", manoeuvre, "--duration", "60", "--turbulence", weather)
-            bag = flown(folder / f"{name}_{weather}_{manoeuvre}", seed, words, name)
-            yield aircraft, load_gap_flight(bag, aircraft, None, "flu")
+def _known(bag: Path, name: str) -> _Known:
+    aircraft = load_aircraft(name)
+    return aircraft, load_gap_flight(bag, aircraft, None, "flu")
 
 
 def _count(flights: list[_Known], factors: Mapping[str, float] | None, late: float = 0.0) -> str:

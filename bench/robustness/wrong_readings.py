@@ -8,10 +8,8 @@ than 15 s, which tell nothing, are left out. ``SYSID_FLIGHTS`` names the folder 
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
-import tempfile
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -20,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.pages import publish, table
-from bench.speed.diagnosis import flown
+from bench.robustness.flights import arguments, grouped
 from sysid_node import load
 from sysid_node.errors import InputError
 from sysid_node.flight.csv import read_csv
@@ -28,8 +26,6 @@ from sysid_node.flight.live.reading_signs import checked_signs
 from sysid_node.flight.record import FlightRecord
 
 _SHORTEST = 15.0  # s
-_BAGS = Path(__file__).parents[2] / "bags"
-_AIRCRAFT = ("cdrw", "cdfp", "kestrel")
 _UNMEASURED = {"phi": math.nan, "theta": math.nan, "psi": math.nan}
 _LATE = (-0.5, -0.3, -0.1, 0.1, 0.3, 0.5)  # s
 _DEGREES = math.degrees(1.0)
@@ -55,15 +51,9 @@ _MISTAKES: Mapping[str, tuple[Mapping[str, float], str]] = {
 
 def main() -> None:
     """Print the table, or put it in a page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--first", type=int, default=1, help="seed of the simulated flights (default: 1)")
-    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
-    args = parser.parse_args()
+    args = arguments(__doc__)
     warnings.simplefilter("ignore")
-    groups = {"real": list(_real()), "bundled": list(_bundled())}
-    with tempfile.TemporaryDirectory() as folder:
-        for weather in ("none", "light", "moderate"):
-            groups[f"simulated, turbulence {weather}"] = list(_simulated(Path(folder), weather, args.first))
+    groups = grouped(_real(), lambda bag, name: load(bag, name).record, args.first)
     rows = [(mistake, *(_share(flights, *_MISTAKES[mistake]) for flights in groups.values())) for mistake in _MISTAKES]
     rows += [
         (
@@ -82,19 +72,6 @@ def _real() -> Iterator[FlightRecord]:
         flight = read_csv(path)
         if flight.time[-1] - flight.time[0] >= _SHORTEST:
             yield flight
-
-
-def _bundled() -> Iterator[FlightRecord]:
-    for bag in sorted(path for path in _BAGS.glob("cd*_*") if path.is_dir()):
-        yield load(bag, bag.name[:4]).record
-
-
-def _simulated(folder: Path, weather: str, first: int) -> Iterator[FlightRecord]:
-    for aircraft in _AIRCRAFT:
-        for seed, manoeuvre in enumerate(("3211", "multisine"), first):
-            words = ("--manoeuvre", manoeuvre, "--duration", "60", "--turbulence", weather)
-            bag = flown(folder / f"{aircraft}_{weather}_{manoeuvre}", seed, words, aircraft)
-            yield load(bag, aircraft).record
 
 
 def _late(flight: FlightRecord, seconds: float) -> FlightRecord:

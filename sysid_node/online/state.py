@@ -167,6 +167,12 @@ class SegmentSolution:
     basis: ValidityBasis | None = None  # made when first wanted
     published: PublishedImperfections | None = None  # made when first wanted
 
+    def corrected(self, errors: SystematicErrors) -> tuple[Array, Array]:
+        """The slopes, each corrected for the systematic ``errors``, and their whole variances, (P, C)."""
+        statistical = self.uncertainty.covariance.diagonal(axis1=1, axis2=2)
+        theta = self.solution.theta + errors.correction[:, :-1].T
+        return np.asarray(theta), np.asarray((statistical + errors.variance[:, :-1]).T)
+
 
 @dataclass
 class PresentSegment:

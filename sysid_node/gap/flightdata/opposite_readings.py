@@ -3,7 +3,7 @@
 A diagnosis would explain a surface that is counted the other way by late commands, or not at all, and positions from -1
 to 1 by wrong inertias, and it would take its time. So it is told before, by least squares of moments and side force on
 flow angle, rates and surfaces (Klein & Morelli (2006), Aircraft System Identification, ch. 5). Gusts and noise make
-these estimates smaller, but do not turn their signs; late surfaces may.
+these estimates smaller; late surfaces may turn their signs.
 """
 
 from __future__ import annotations

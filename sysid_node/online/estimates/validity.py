@@ -150,11 +150,9 @@ def _motion_before_its_cause(state: EstimatorState, latest: SegmentSolution) -> 
     structure, found = state.equations.structure, latest.systematic
     if found is None:
         return []
-    variance = latest.uncertainty.covariance.diagonal(axis1=1, axis2=2) + found.variance[:, :-1]
-    theta = latest.solution.theta + found.correction[:, :-1].T
     return [
         (symbol, _with_control(structure, symbol) & (structure.block == structure.block[c]))
-        for c, symbol in damping.amplified(structure, theta, variance.T).items()
+        for c, symbol in damping.amplified(structure, *latest.corrected(found)).items()
     ]
 
 

@@ -3,8 +3,8 @@
 The moment by a rate of rotation is opposed to it in every unstalled flight: Cl_p, Cm_q and Cn_r are negative (Etkin &
 Reid, "Dynamics of Flight", 3rd ed. (1996), ch. 5). Of a rotation that follows its control after a time T, the servo's
 time and that of the motion add up to T. Where the servo's time comes out larger than T, that of the motion is negative:
-the motion then seems to come before its cause, and all derivatives of the moment have the wrong sign. They look as
-precise as the right ones.
+the motion then seems to come before its cause, and the derivatives by which it is told, those by the rate and by the
+control among them, have the wrong sign. They look as precise as the right ones.
 """
 
 from __future__ import annotations

@@ -131,8 +131,7 @@ def _improbability(state: EstimatorState, found: SystematicErrors, own: Fit, oth
     noise = np.where(other.noise > 0.0, np.minimum(own.noise, other.noise), 0.0)
     expected, precision = state.model.prior  # (P, C)
     told = (precision > 0.0) & (state.equations.structure.belongs > 0.0)
-    variance = latest.uncertainty.covariance.diagonal(axis1=1, axis2=2).T + found.variance[:, :-1].T
-    theta = latest.solution.theta + found.correction[:, :-1].T
+    theta, variance = latest.corrected(found)
     off = theta - expected
     squares = np.where(told, off * off / (1.0 / np.where(told, precision, 1.0) + np.maximum(variance, 0.0)), 0.0)
     amplified = damping.amplified(state.equations.structure, theta, variance)

@@ -12,6 +12,9 @@ from sysid_node.errors import InputError, InputWarning
 from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
 from sysid_node.gap.flightdata.opposite_readings import check_directions
 
+#: Flights that are taken are taken without a word.
+pytestmark = pytest.mark.filterwarnings("error::sysid_node.errors.InputWarning")
+
 NO_VANES = {"alpha": np.nan, "beta": np.nan}
 
 

@@ -112,7 +112,7 @@ def test_slopes_that_a_poorly_known_servo_changes_by_much_are_not_valid() -> Non
 def test_nothing_of_an_axis_is_valid_whose_motion_would_amplify_itself() -> None:
     """Truth: measured positions, taken for commands of a servo of 0.2 s: the roll comes before its cause.
 
-    All derivatives of the rolling moment then had the other sign and were ``ok``.
+    ``Cl_p``, ``Cl_da`` and ``Cl_beta`` had the other sign and were ``ok``.
     """
     bag = Path(__file__).parents[3] / "bags" / "cdrw_multistep"
     file = replace(load_aircraft("cdrw"), effects={"actuator_lag": {"aileron": UncertainValue(0.2, 0.001)}})
