@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -15,14 +14,6 @@ _AIRCRAFT = ("cdrw", "cdfp", "kestrel")
 _WEATHERS = ("none", "light", "moderate")
 
 Flight = TypeVar("Flight")
-
-
-def arguments(description: str | None) -> argparse.Namespace:
-    """The seed of the first simulated flight, ``first``, and the ``page`` to fill."""
-    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--first", type=int, default=1, help="seed of the simulated flights (default: 1)")
-    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
-    return parser.parse_args()
 
 
 def grouped(real: Iterable[Flight], read: Callable[[Path, str], Flight], first: int) -> dict[str, list[Flight]]:

@@ -8,6 +8,7 @@ aircraft files that are believed there; ``SYSID_FLIGHTS`` names their folder.
 
 from __future__ import annotations
 
+import argparse
 import math
 import os
 import warnings
@@ -19,7 +20,7 @@ import numpy as np
 
 from bench.gap.spikes import gap_flight
 from bench.pages import publish, table
-from bench.robustness.flights import arguments, grouped
+from bench.robustness.flights import grouped
 from bench.spikes.records import FLIGHTS, belief, part
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
@@ -49,7 +50,10 @@ _Known = tuple[Aircraft, GapFlight]
 
 def main() -> None:
     """Print the table, or put it in a page."""
-    args = arguments(__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--first", type=int, default=1, help="seed of the simulated flights (default: 1)")
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
+    args = parser.parse_args()
     warnings.simplefilter("ignore")
     groups = grouped(_real(), _known, args.first)
     rows = [(wrong, *(_count(flights, factors) for flights in groups.values())) for wrong, factors in _MISTAKES.items()]

@@ -8,6 +8,7 @@ than 15 s, which tell nothing, are left out. ``SYSID_FLIGHTS`` names the folder 
 
 from __future__ import annotations
 
+import argparse
 import math
 import os
 import warnings
@@ -18,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.pages import publish, table
-from bench.robustness.flights import arguments, grouped
+from bench.robustness.flights import grouped
 from sysid_node import load
 from sysid_node.errors import InputError
 from sysid_node.flight.csv import read_csv
@@ -51,7 +52,10 @@ _MISTAKES: Mapping[str, tuple[Mapping[str, float], str]] = {
 
 def main() -> None:
     """Print the table, or put it in a page."""
-    args = arguments(__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--first", type=int, default=1, help="seed of the simulated flights (default: 1)")
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
+    args = parser.parse_args()
     warnings.simplefilter("ignore")
     groups = grouped(_real(), lambda bag, name: load(bag, name).record, args.first)
     rows = [(mistake, *(_share(flights, *_MISTAKES[mistake]) for flights in groups.values())) for mistake in _MISTAKES]
