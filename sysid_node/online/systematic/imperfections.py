@@ -20,7 +20,7 @@ from sysid_node.online.systematic import servo_model
 from sysid_node.online.systematic.column_changes import ColumnChanges, flight_means
 from sysid_node.online.systematic.cross_spectra import ServoColumns, band_grams
 from sysid_node.online.systematic.cross_spectra import with_servos as spectra_with_servos
-from sysid_node.online.systematic.servo_model import CUBIC, ServoModel
+from sysid_node.online.systematic.servo_model import SHORTEST, ServoModel
 from sysid_node.online.systematic.sources import ErrorSource, describe, not_negative, sources
 
 Array = NDArray[np.float64]
@@ -45,7 +45,6 @@ ALIKE = 0.99
 HELD_OR_NOT = 0.01 / math.sqrt(3.0)
 SMALLEST = 1e-4  # s: 1 sigma of a servo of which only the rate limit is not exactly known
 KNOWN = 0.03  # s: the largest 1 sigma of a servo of which something is known
-SHORTEST = 0.02  # s: the lateness from which on the tolerances of B and of the third coefficient go with it
 
 
 @dataclass(frozen=True)
@@ -249,7 +248,7 @@ def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array, Ar
     of_sources = [source.sigma for source in imperfect.sources]
     sigmas = np.concatenate([of_sources, imperfect.sigmas, of_curvature, of_third])
     more = late - imperfect.applied.lateness[imperfect.timed]  # beyond the file's servo; it may be a lag or a delay
-    coupling = _coupling(imperfect, 2.0 * CURVATURE * more, CUBIC * curved, CUBIC * late)
+    coupling = _coupling(imperfect, 2.0 * CURVATURE * more, *servo_model.third_slopes(late, curved))
     of_sources = [source.expected for source in imperfect.sources]
     about = imperfect.applied.curvature[imperfect.timed] + CURVATURE * more**2 - curved
     means = np.concatenate([of_sources, imperfect.expected - more, about, np.zeros(late.size)])
