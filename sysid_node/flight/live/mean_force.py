@@ -88,7 +88,7 @@ def fault_of(mean: float) -> str:
     elif size <= _IN_G:
         cause = "it is in g (multiply by 9.80665), or gravity has been taken out"
     else:
-        cause = "its unit is not m/s^2"
+        cause = "its unit is not m/s^2 (in ft/s^2 it is about -32), or the aircraft was out of control"
     return f"mean specific force along z (down) is {mean:.2f} m/s^2, and of a flight about -9.8: {cause}?"
 
 
