@@ -11,7 +11,8 @@ several points). Both solutions are then weighed by
 
 with the same noise for both. Of the derivatives' errors Student's distribution with few degrees of freedom is believed,
 for a file is now and then far off. If the other solution is surely more probable, it is taken, unless it leaves more
-that moves with the controls beside its own noise. If neither is taken for sure, the intervals reach to both: the estimate is that of a mixture (McLachlan & Peel, "Finite Mixture Models", 2000).
+that moves with the controls beside its own noise. If neither surely is, the intervals reach to both: the estimate is
+that of a mixture (McLachlan & Peel, "Finite Mixture Models", 2000).
 
 A solution in which a rotation amplifies itself (``regression.damping``) is less probable than any other.
 """
