@@ -141,7 +141,7 @@ def _improbability(state: EstimatorState, found: SystematicErrors, own: Fit, oth
 
 
 def _explains_less(other: SystematicErrors, found: SystematicErrors) -> bool:
-    """Whether the ``other`` leaves more beside its own noise that moves with the controls (Hansen's J, 1982)."""
+    """Whether the ``other`` fits worse, each by its own noise: more of what it leaves moves with the controls."""
     own, theirs = found.considered.fit, other.considered.fit
     return theirs.cost(theirs) > own.cost(own) + SURELY
 
