@@ -32,7 +32,8 @@ def test_reversed_axes_are_refused() -> None:
 @pytest.mark.parametrize("mean", [-980.0, -32.2, -50.4])
 def test_another_unit_or_many_g_are_refused(mean: float) -> None:
     """cm/s^2, ft/s^2, and the spiral dive of a simulated flight whose aileron jams."""
-    with pytest.raises(InputError, match=r"its unit is not m/s\^2 \(in ft/s\^2 .* or the aircraft was out of control\?"):
+    said = r"its unit is not m/s\^2 \(in ft/s\^2 .* or the aircraft was out of control\?"
+    with pytest.raises(InputError, match=said):
         checked_force(record(mean))
 
 
