@@ -6,6 +6,7 @@ import gc
 import signal
 import sys
 import textwrap
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,6 +29,8 @@ _AT_SHUTDOWN = (
     rclpy_implementation.InvalidHandle,
     rclpy_implementation.RCLError,
 )
+#: Set once Ctrl-C or SIGTERM has come, up to the moment from which an executor takes them.
+_told_to_stop = threading.Event()
 
 
 def run_node(make: Callable[[], Node], about: str, table: Sequence[NodeParameter] = ()) -> int:
@@ -64,7 +67,7 @@ def run_program(program: Callable[[], None]) -> int:
     of rclpy's conversion of a message one becomes a RuntimeError.
     """
     for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, lambda *_: None)  # ROS's own handler, added next, calls this one
+        signal.signal(one, lambda *_: _told_to_stop.set())  # ROS's own handler, added next, calls this one
     try:
         rclpy.init()
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
@@ -72,6 +75,7 @@ def run_program(program: Callable[[], None]) -> int:
         return 2
     try:
         with until_shutdown():
+            _shut_down_if_told()
             program()
     except InputError as error:
         rclpy.logging.get_logger("sysid").fatal(str(error))
@@ -81,6 +85,12 @@ def run_program(program: Callable[[], None]) -> int:
         for one in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C while Python ends would be its exit code
             signal.signal(one, signal.SIG_IGN)
     return 0
+
+
+def _shut_down_if_told() -> None:
+    """Shut ROS down where a signal has come that its handler, a thread of its own, missed or has yet to answer."""
+    if _told_to_stop.is_set():
+        rclpy.try_shutdown()
 
 
 @contextmanager
@@ -123,6 +133,9 @@ def serve(node: Node) -> None:
     executor.add_node(node)
     gc.freeze()  # modules stay, so that the collector need not scan them while messages wait
     try:
+        # From now on the executor takes the signals, between two callbacks. One that came before must not shut ROS
+        # down while the executor adds the node's parts: rclpy then aborts the process.
+        _shut_down_if_told()
         while rclpy.ok():
             executor.spin_once(timeout_sec=0.1)
     finally:

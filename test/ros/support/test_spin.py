@@ -57,6 +57,22 @@ sys.exit(run_program(program))
 """
 
 
+STOPPED_WHILE_ROS_BEGINS = """
+import os, signal, sys
+import rclpy
+from sysid_node.ros.support.spin import run_program
+
+begin = rclpy.init
+
+def slow_beginning():
+    os.kill(os.getpid(), signal.{signal})  # before there is anything that ROS's own handler could shut down
+    begin()
+
+rclpy.init = slow_beginning
+sys.exit(run_program(lambda: print("ROS is up" if rclpy.ok() else "told to stop")))
+"""
+
+
 def ended(text: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-c", text, *arguments]
     return subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
@@ -65,6 +81,12 @@ def ended(text: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 def test_ctrl_c_and_sigterm_let_the_program_end_instead_of_raising_in_the_middle_of_it() -> None:
     for name in ("SIGINT", "SIGTERM"):
         done = ended(INTERRUPTED.format(signal=name))
+        assert (done.returncode, done.stdout, done.stderr) == (0, "told to stop\n", "")
+
+
+def test_a_signal_that_comes_while_ros_begins_is_not_lost() -> None:
+    for name in ("SIGINT", "SIGTERM"):
+        done = ended(STOPPED_WHILE_ROS_BEGINS.format(signal=name))
         assert (done.returncode, done.stdout, done.stderr) == (0, "told to stop\n", "")
 
 
