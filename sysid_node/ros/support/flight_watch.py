@@ -25,6 +25,7 @@ from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.online.types import Estimates
 from sysid_node.ros.support.conversion import NANOSECONDS, estimates_from_message, stamp_ns
 from sysid_node.ros.support.loop_node import DERIVATIVES, SENSOR_QOS
+from sysid_node.ros.support.spin import take_up
 
 FAULTS = "fault_monitor/faults"
 
@@ -55,7 +56,7 @@ class FlightWatch:
         ):
             self.node.create_subscription(kind, topic, self._sparsely(kind, topic, take), SENSOR_QOS, raw=True)
         self._executor = EventsExecutor()
-        self._executor.add_node(self.node)
+        take_up(self._executor, self.node)
 
     def listen(self, seconds: float) -> None:
         """Receive messages for so many seconds of a clock that never jumps, whatever the time of /clock."""

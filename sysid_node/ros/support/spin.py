@@ -10,14 +10,16 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import rclpy
 from rclpy.exceptions import NotInitializedException
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import Executor, ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 
 from sysid_node.errors import InputError
 from sysid_node.parameter import NodeParameter
@@ -29,8 +31,8 @@ _AT_SHUTDOWN = (
     rclpy_implementation.InvalidHandle,
     rclpy_implementation.RCLError,
 )
-#: Set once Ctrl-C or SIGTERM has come, up to the moment from which an executor takes them.
-_told_to_stop = threading.Event()
+#: Held while ROS must not be shut down by a signal.
+_staying_up = threading.Lock()
 
 
 def run_node(make: Callable[[], Node], about: str, table: Sequence[NodeParameter] = ()) -> int:
@@ -66,31 +68,47 @@ def run_program(program: Callable[[], None]) -> int:
     does, and ``program`` must end when ``rclpy.ok()`` is false. There is no KeyboardInterrupt, because in the middle
     of rclpy's conversion of a message one becomes a RuntimeError.
     """
+    told: SimpleQueue[None] = SimpleQueue()  # a handler of signals may put into it
     for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, lambda *_: _told_to_stop.set())  # ROS's own handler, added next, calls this one
+        signal.signal(one, lambda *_: told.put(None))
     try:
-        rclpy.init()
+        # rclpy's own handlers miss what comes while ROS begins, and shut it down in the middle of ``take_up``.
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
         rclpy.logging.get_logger("sysid").fatal(f"arguments after --ros-args: {' '.join(str(error).split())}")
         return 2
+    stopper = threading.Thread(target=_shut_down_once, args=(told,))
+    stopper.start()
     try:
         with until_shutdown():
-            _shut_down_if_told()
             program()
     except InputError as error:
         rclpy.logging.get_logger("sysid").fatal(str(error))
         return 2
     finally:
-        rclpy.try_shutdown()
+        told.put(None)
+        stopper.join()
         for one in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C while Python ends would be its exit code
             signal.signal(one, signal.SIG_IGN)
     return 0
 
 
-def _shut_down_if_told() -> None:
-    """Shut ROS down where a signal has come that its handler, a thread of its own, missed or has yet to answer."""
-    if _told_to_stop.is_set():
+def _shut_down_once(told: SimpleQueue[None]) -> None:
+    """Shut ROS down once the program is told to stop, or is done."""
+    told.get()
+    with _staying_up, until_shutdown():
         rclpy.try_shutdown()
+
+
+def take_up(executor: Executor, node: Node) -> None:
+    """Have an executor add a node and its parts.
+
+    ROS stays up meanwhile: where it is shut down in the middle, rclpy's events executor aborts the process.
+    """
+    executor.add_node(node)
+    with _staying_up:
+        if rclpy.ok():
+            executor.spin_once(timeout_sec=0.0)
 
 
 @contextmanager
@@ -130,12 +148,9 @@ def serve(node: Node) -> None:
     ``spin_once``.
     """
     executor = EventsExecutor()
-    executor.add_node(node)
     gc.freeze()  # modules stay, so that the collector need not scan them while messages wait
     try:
-        # From now on the executor takes the signals, between two callbacks. One that came before must not shut ROS
-        # down while the executor adds the node's parts: rclpy then aborts the process.
-        _shut_down_if_told()
+        take_up(executor, node)
         while rclpy.ok():
             executor.spin_once(timeout_sec=0.1)
     finally:

@@ -58,18 +58,59 @@ sys.exit(run_program(program))
 
 
 STOPPED_WHILE_ROS_BEGINS = """
-import os, signal, sys
+import os, signal, sys, time
 import rclpy
 from sysid_node.ros.support.spin import run_program
 
 begin = rclpy.init
 
-def slow_beginning():
-    os.kill(os.getpid(), signal.{signal})  # before there is anything that ROS's own handler could shut down
-    begin()
+def slow_beginning(**options):
+    os.kill(os.getpid(), signal.{signal})  # before there is anything that could be shut down
+    begin(**options)
+
+def program():
+    end = time.monotonic() + 10.0
+    while rclpy.ok() and time.monotonic() < end:
+        time.sleep(0.01)
+    print("ended by itself" if rclpy.ok() else "told to stop")
 
 rclpy.init = slow_beginning
-sys.exit(run_program(lambda: print("ROS is up" if rclpy.ok() else "told to stop")))
+sys.exit(run_program(program))
+"""
+
+STOPPED_WHILE_A_NODE_IS_TAKEN_UP = """
+import os, signal, sys, time
+from rclpy.node import Node
+from rclpy.waitable import NumberOfEntities, Waitable
+from std_msgs.msg import String
+from sysid_node.ros.support.spin import run_node
+
+class Part(Waitable):
+    looked_at = 0
+
+    def add_to_wait_set(self, wait_set):
+        pass
+
+    def is_ready(self, wait_set):
+        return False
+
+    def get_num_entities(self):
+        Part.looked_at += 1
+        if Part.looked_at == 2:
+            os.kill(os.getpid(), signal.{signal})
+            time.sleep(0.2)  # time enough to shut ROS down
+        return NumberOfEntities()
+
+class Early(Node):
+    def __init__(self):
+        super().__init__("early")
+        self.create_subscription(String, "text", lambda message: None, 10)
+        for _ in range(4):
+            self.add_waitable(Part(self.default_callback_group))
+
+code = run_node(Early, "")
+print("looked at", Part.looked_at)
+sys.exit(code)
 """
 
 
@@ -88,6 +129,13 @@ def test_a_signal_that_comes_while_ros_begins_is_not_lost() -> None:
     for name in ("SIGINT", "SIGTERM"):
         done = ended(STOPPED_WHILE_ROS_BEGINS.format(signal=name))
         assert (done.returncode, done.stdout, done.stderr) == (0, "told to stop\n", "")
+
+
+def test_a_signal_that_comes_while_the_executor_takes_the_node_up_does_not_abort_the_process() -> None:
+    """It did: rclpy's events executor ends with "Destroying callback manager with callbacks remaining"."""
+    for name in ("SIGINT", "SIGTERM"):
+        done = ended(STOPPED_WHILE_A_NODE_IS_TAKEN_UP.format(signal=name))
+        assert (done.returncode, done.stdout, done.stderr) == (0, "looked at 4\n", "")
 
 
 def test_what_ros_refuses_while_it_shuts_down_is_no_failure_and_everything_else_is() -> None:
