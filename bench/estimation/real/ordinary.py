@@ -82,7 +82,7 @@ def estimated(
         raise SystemExit(f"{flight.name}: nothing was estimated, or the aircraft file has no tolerances")
     considered = latest.systematic.considered
     jacobian = considered.jacobian.reshape(considered.jacobian.shape[0], -1)[:, state.model.table.place]
-    tolerances, _ = prior(imperfections, latest.systematic.lines)
+    tolerances, _, _ = prior(imperfections, latest.systematic.lines)
     # a servo has its key twice: for its lateness and its curvature
     keys = [f"{key} {imperfections.keys[:i].count(key)}" for i, key in enumerate(imperfections.keys)]
     return Known(history[-1], covariance, Imperfect(jacobian, considered.covariance, tolerances, keys))

@@ -88,7 +88,7 @@ def _posterior_of(state: EstimatorState) -> _OneFlight | None:
     if imperfect is None or latest is None or latest.systematic is None:
         return None
     found, table = latest.systematic, state.model.table
-    sigmas, centre = prior(imperfect.limited(found.limits), found.lines)
+    sigmas, centre, precision = prior(imperfect.limited(found.limits), found.lines)
     base = _servos_of_lines(imperfect, found)
     inverse = np.linalg.inv(found.considered.covariance / sigmas / sigmas[:, None])
     jacobian = found.considered.jacobian
@@ -96,9 +96,9 @@ def _posterior_of(state: EstimatorState) -> _OneFlight | None:
         _named(imperfect, commanded=state.model.sample.commanded),
         sigmas,
         base + centre,
-        inverse - imperfect.precision,
+        inverse - precision,
         inverse @ ((found.considered.estimate - centre) / sigmas),
-        imperfect.precision,
+        precision,
         table.names,
         jacobian.reshape(sigmas.size, -1)[:, table.place],
         latest.total.energy,
@@ -109,8 +109,8 @@ def _posterior_of(state: EstimatorState) -> _OneFlight | None:
 def _servos_of_lines(imperfect: Imperfections, found: SystematicErrors) -> Array:
     """(K,) from where the estimates count: where the estimator had the servos; zero for all else."""
     at = imperfect.timed
-    lines, none = found.lines, np.zeros(len(imperfect.controls))
-    return np.concatenate([np.zeros(len(imperfect.sources)), lines.lateness[at], lines.curvature[at], none])
+    lines = found.lines
+    return np.concatenate([np.zeros(len(imperfect.sources)), lines.lateness[at], lines.curvature[at], lines.third[at]])
 
 
 def _named(imperfect: Imperfections, *, commanded: bool) -> tuple[Imperfection, ...]:

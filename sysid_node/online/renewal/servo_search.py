@@ -10,8 +10,9 @@ several points). Both solutions are then weighed by
     -2 log p = explained energy / noise + imperfections' squares in tolerances + derivatives off the aircraft file's,
 
 with the same noise for both. Of the derivatives' errors Student's distribution with few degrees of freedom is believed,
-for a file is now and then far off. If the other solution is surely more probable, it is taken. If neither surely is,
-the intervals reach to both: the estimate is that of a mixture (McLachlan & Peel, "Finite Mixture Models", 2000).
+for a file is now and then far off. If the other solution is surely more probable, it is taken, unless it leaves more
+that moves with the controls beside its own noise. If neither surely is, the intervals reach to both: the estimate is
+that of a mixture (McLachlan & Peel, "Finite Mixture Models", 2000).
 
 A solution in which a rotation amplifies itself (``regression.damping``) is less probable than any other.
 """
@@ -66,7 +67,7 @@ def try_another_solution(state: EstimatorState) -> Steps[None]:
     less = _improbability(state, found, found.considered.fit, other.considered.fit) - _improbability(
         trial, other, other.considered.fit, found.considered.fit
     )
-    if less > SURELY:
+    if less > SURELY and not _explains_less(other, found):
         yield from _take(state, trial)
         other, less = found, -less
     probability = 1.0 / (1.0 + math.exp(min(-0.5 * min(less, 0.0), 100.0)))
@@ -137,6 +138,12 @@ def _improbability(state: EstimatorState, found: SystematicErrors, own: Fit, oth
     amplified = damping.amplified(state.equations.structure, theta, variance)
     of_derivatives = float((FREEDOM + 1.0) * np.log1p(squares / FREEDOM).sum())
     return own.cost(replace(own, noise=noise)) + of_derivatives + IMPOSSIBLE * len(amplified)
+
+
+def _explains_less(other: SystematicErrors, found: SystematicErrors) -> bool:
+    """Whether the ``other`` fits worse, each by its own noise: more of what it leaves moves with the controls."""
+    own, theirs = found.considered.fit, other.considered.fit
+    return theirs.cost(theirs) > own.cost(own) + SURELY
 
 
 def _take(state: EstimatorState, trial: EstimatorState) -> Steps[None]:

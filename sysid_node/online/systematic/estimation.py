@@ -38,7 +38,7 @@ EARLY = 10.0
 class AlternativeSolution:
     """Another solution, which the data and what is believed hardly tell from the one that is taken."""
 
-    imperfections: Array  # (K,) with the servos' lateness and curvature themselves
+    imperfections: Array  # (K,) with the servos' coefficients themselves
     probability: float  # of it, at most a half
 
     @classmethod
@@ -109,7 +109,7 @@ def systematic_errors(
     reach to the ``alternatives``. It is made in steps (``state.Steps``).
     """
     equations, spread = solved.equations, solved.spread
-    beliefs = Beliefs(*prior(imperfect, servos), imperfect.precision)
+    beliefs = Beliefs(*prior(imperfect, servos))
     noise = solved.inflation * noise_per_gram(equations, spread, signals.information)
     found = yield from consider(
         equations,
@@ -158,10 +158,11 @@ def with_steps(imperfect: Imperfections, found: Considered) -> Considered:
 
 
 def _base(imperfect: Imperfections, servos: ServoModel) -> Array:
-    """(K,) from where estimates of imperfections count: where the lines have the ``servos``, and zero."""
+    """(K,) from where estimates of imperfections count: where the lines have the ``servos``; zero for all else."""
     at = imperfect.timed
-    none = np.zeros(at.size)
-    return np.concatenate([np.zeros(len(imperfect.sources)), servos.lateness[at], servos.curvature[at], none])
+    return np.concatenate(
+        [np.zeros(len(imperfect.sources)), servos.lateness[at], servos.curvature[at], servos.third[at]]
+    )
 
 
 def worse(found: SystematicErrors, before: SystematicErrors) -> bool:
@@ -183,10 +184,11 @@ def to_take_out(imperfect: Imperfections, servos: ServoModel, last: SystematicEr
     if last is None:
         return np.array([*(source.stated for source in imperfect.sources), *np.zeros(3 * m)])
     late, curved = last.servos.lateness[at] - servos.lateness[at], last.servos.curvature[at] - servos.curvature[at]
-    sigmas, expected = (each[:S] for each in prior(imperfect, servos))
+    third = last.lines.third[at] - servos.third[at] + last.considered.estimate[S + 2 * m :]
+    sigmas, expected = (each[:S] for each in prior(imperfect, servos)[:2])
     most = LARGEST_CORRECTION * sigmas
     sources = np.clip(last.considered.estimate[:S], expected - most, expected + most)
-    return np.concatenate([sources, late, curved, last.considered.estimate[S + 2 * m :]])
+    return np.concatenate([sources, late, curved, third])
 
 
 def noise_per_gram(equations: NormalEquations, spread: Uncertainty, total: Information) -> Array:

@@ -20,7 +20,7 @@ from sysid_node.online.systematic import servo_model
 from sysid_node.online.systematic.column_changes import ColumnChanges, flight_means
 from sysid_node.online.systematic.cross_spectra import ServoColumns, band_grams
 from sysid_node.online.systematic.cross_spectra import with_servos as spectra_with_servos
-from sysid_node.online.systematic.servo_model import ServoModel
+from sysid_node.online.systematic.servo_model import SHORTEST, ServoModel
 from sysid_node.online.systematic.sources import ErrorSource, describe, not_negative, sources
 
 Array = NDArray[np.float64]
@@ -45,7 +45,6 @@ ALIKE = 0.99
 HELD_OR_NOT = 0.01 / math.sqrt(3.0)
 SMALLEST = 1e-4  # s: 1 sigma of a servo of which only the rate limit is not exactly known
 KNOWN = 0.03  # s: the largest 1 sigma of a servo of which something is known
-SHORTEST = 0.02  # s: the lateness from which on the tolerances of B and of the third coefficient go with it
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ class Imperfections:
     expected: Array  # (m,) s: the lateness that is expected beyond the aircraft file's
     sigmas: Array  # (m,) s: 1 sigma of the lateness about that
     unknown: Index  # places among the m of the servos of which nothing is known, see ``_UncertainServo``
-    precision: Array  # (K, K) inverse of the correlations before the flight
+    precision: Array  # (K, K) inverse of the correlations before the flight, but for what ``prior`` adds
     columns: ServoColumns
     stamps: float  # s: 1 sigma of the lateness of the stamps of controls and motion, against each other
     step_time: float  # s: 1 sigma of the time of steps in a log's commands
@@ -237,20 +236,38 @@ def column_changes(
     return changes
 
 
-def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array]:
-    """(K,) 1 sigma of each, and (K,) its mean, both from where the servos are at present taken to be."""
+def prior(imperfect: Imperfections, model: ServoModel) -> tuple[Array, Array, Array]:
+    """(K,) 1 sigma of each and (K,) its mean, both from where the servos are at present taken to be, and (K, K).
+
+    The last is the inverse of the correlations: what is expected of a servo's curvature goes with its lateness, and of
+    its third coefficient with both.
+    """
     late, curved = model.lateness[imperfect.timed], model.curvature[imperfect.timed]
     size = np.maximum(late, max(SHORTEST, math.sqrt(3.0) * imperfect.step_time))  # a step is off by half an interval
     of_curvature, of_third = CURVATURE * size**2, THIRD * size**3
     of_sources = [source.sigma for source in imperfect.sources]
     sigmas = np.concatenate([of_sources, imperfect.sigmas, of_curvature, of_third])
-    stated, expected = imperfect.applied.lateness[imperfect.timed], imperfect.applied.curvature[imperfect.timed]
-    # what is late beyond the file's servo may be a lag or a delay
-    expected = expected + CURVATURE * (late - stated) ** 2
+    more = late - imperfect.applied.lateness[imperfect.timed]  # beyond the file's servo; it may be a lag or a delay
+    coupling = _coupling(imperfect, 2.0 * CURVATURE * more, *servo_model.third_slopes(late, curved))
     of_sources = [source.expected for source in imperfect.sources]
-    none = np.zeros(late.size)
-    means = np.concatenate([of_sources, stated + imperfect.expected - late, expected - curved, none])
-    return sigmas, means
+    about = imperfect.applied.curvature[imperfect.timed] + CURVATURE * more**2 - curved
+    means = np.concatenate([of_sources, imperfect.expected - more, about, np.zeros(late.size)])
+    scaled = coupling * sigmas / sigmas[:, None]
+    return sigmas, np.linalg.solve(coupling, means), scaled.T @ imperfect.precision @ scaled
+
+
+def _coupling(imperfect: Imperfections, curvature: Array, third: Array, third_of_curvature: Array) -> Array:
+    """(K, K) of all imperfections those parts that do not follow from others.
+
+    A servo's curvature is expected to change with its lateness by the slope ``curvature`` (m,) s, its third coefficient
+    by ``third`` (m,) s^2, and with the curvature by ``third_of_curvature`` (m,) s.
+    """
+    m, first = len(imperfect.controls), imperfect.servos.start
+    coupling, servo = np.eye(first + 3 * m), np.arange(first, first + m)
+    coupling[servo + m, servo] = -curvature
+    coupling[servo + 2 * m, servo] = -third
+    coupling[servo + 2 * m, servo + m] = -third_of_curvature
+    return coupling
 
 
 def remapped(

@@ -5,7 +5,7 @@
 with the lateness L (s), the curvature B (s^2) and C (s^3). B = C = 0 is a servo of first order with the time constant
 L; one of second order with natural frequency w and damping d has L = 2 d / w, B = 1 / w^2 and C = 0; a delay has
 B = L^2 / 2 and C = L^3 / 6; and a servo with a delay has the product of both. In the band of the lines, a few rad/s,
-flights tell L and B apart. What they change of C follows from both, ``CUBIC`` L B, within a tolerance.
+flights tell L and B apart. What they change of C follows from both, ``CUBIC`` B^2 / L, within a tolerance.
 
 What the alignment has applied already to the recorded commands (the file's servo, with L0, B0 and C0) is taken out:
 the response is (1 + L0 s + B0 s^2 + C0 s^3) h(s). It is written as 1 + j omega g(omega), so that it acts on the exact
@@ -25,9 +25,10 @@ from sysid_node.flight.servos import Servo
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: C over L B of what is not known of a servo: 0 for lags without a delay, 1/3 for a delay, and 0.1 to 0.25 for a lag
-#: with a delay of a third of its lateness.
-CUBIC = 0.2
+#: C L over B^2 of what is not known of a servo: 0 for lags of first and second order without a delay, 2/3 for a delay,
+#: 0.56 for a lag of first order with a delay of a third of the lateness, 0.47 for one of second order (damping 0.7).
+CUBIC = 0.4
+SHORTEST = 0.02  # s: the lateness from which on C, and the tolerances of B and C, go with it
 LATEST = 0.5  # s: no servo of an aircraft that flies is later
 
 
@@ -42,10 +43,21 @@ class ServoModel:
     def moved(self, by_lateness: Array, by_curvature: Array) -> ServoModel:
         """Another such model, kept within what is possible: a response that has no resonance in the band."""
         lateness = np.clip(self.lateness + by_lateness, -0.1, LATEST)
-        least = -0.25 * np.maximum(lateness, 0.02) ** 2
-        curvature = np.clip(self.curvature + by_curvature, least, np.maximum(lateness, 0.02) ** 2)
-        third = self.third + CUBIC * (lateness * curvature - self.lateness * self.curvature)
+        most = np.maximum(lateness, SHORTEST) ** 2
+        curvature = np.clip(self.curvature + by_curvature, -0.25 * most, most)
+        third = self.third + expected_third(lateness, curvature) - expected_third(self.lateness, self.curvature)
         return ServoModel(lateness, curvature, third)
+
+
+def expected_third(lateness: Array, curvature: Array) -> Array:
+    """(m,) C (s^3) that is expected of servos of which L (s) and B (s^2) alone are known."""
+    return np.asarray(CUBIC * curvature**2 / np.maximum(lateness, SHORTEST))
+
+
+def third_slopes(lateness: Array, curvature: Array) -> tuple[Array, Array]:
+    """(m,) slopes of ``expected_third`` by the lateness (s^2) and by the curvature (s)."""
+    ratio = curvature / np.maximum(lateness, SHORTEST)
+    return np.where(lateness > SHORTEST, -CUBIC * ratio**2, 0.0), 2.0 * CUBIC * ratio
 
 
 def of_servo(servo: Servo) -> tuple[float, float, float]:

@@ -12,7 +12,8 @@ from plant import made_aircraft
 
 from sysid_node.aircraft.model import UncertainValue
 from sysid_node.online.frequency.regression_signals import layout
-from sysid_node.online.systematic.imperfections import Imperfections, imperfections
+from sysid_node.online.systematic.imperfections import CURVATURE, THIRD, Imperfections, imperfections, prior
+from sysid_node.online.systematic.servo_model import ServoModel, expected_third
 
 CONTROLS = ("elevator", "aileron", "rudder")
 T, D = 1.0 / (2.0 * math.pi * 3.0), 0.9  # s, 1: servos of 3 Hz
@@ -79,3 +80,31 @@ def test_servos_of_which_nothing_is_known_are_alike(stated):
     for order in range(3):
         block = slice(first + 3 * order, first + 3 * order + 3)
         np.testing.assert_allclose(correlation[block, block], 0.8 + 0.2 * np.eye(3), atol=1e-9)
+
+
+def test_what_is_believed_of_a_servos_coefficients_goes_together():
+    """Gradient of the sum of squares that the estimates minimise, of servos of which nothing is known.
+
+    Truth: the same sum written out, with the curvature about a quarter of the square of the lateness, and the third
+    coefficient about what both let expect; by central differences.
+    """
+    aircraft = replace(made_aircraft(), ideal=False)
+    found = imperfections(aircraft, layout(aircraft), commanded=True, positions=False)
+    assert found is not None
+    late, curved, m = np.array([0.06, 0.04, 0.05]), np.array([1.5e-3, 4e-4, 0.0]), 3
+    sigmas, means, precision = prior(found, ServoModel(late, curved, np.zeros(m)))
+    first = found.servos.start
+
+    def squares(step: np.ndarray) -> float:
+        L, B = late + step[first : first + m], curved + step[first + m : first + 2 * m]
+        off = step / sigmas
+        off[:first] -= means[:first] / sigmas[:first]
+        off[first : first + m] = (L - found.expected) / sigmas[first : first + m]
+        off[first + m : first + 2 * m] = (B - CURVATURE * L**2) / (CURVATURE * late**2)
+        third = expected_third(late, curved) + step[first + 2 * m :]
+        off[first + 2 * m :] = (third - expected_third(L, B)) / (THIRD * late**3)
+        return float(off @ found.precision @ off)
+
+    steps = 1e-4 * np.diag(sigmas)
+    truth = [(squares(h) - squares(-h)) / 2e-4 for h in steps]
+    assert -2.0 * precision @ (means / sigmas) == pytest.approx(truth, rel=1e-5, abs=1e-5)

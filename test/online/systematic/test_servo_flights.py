@@ -78,3 +78,24 @@ def test_with_the_usual_noise_intervals_hold() -> None:
     errors = np.sort(np.abs(scores))
     assert errors[-2] < 2.6
     assert errors[-1] < 3.5
+
+
+def test_the_form_of_a_response_does_not_tell_late_servos_from_late_stamps() -> None:
+    """Servos of second order without a delay, in still air, of which the file says nothing.
+
+    Truth: the tolerances of the clocks of controls and IMU, of which a flight shows the sum with the servos' lateness.
+    Where what is expected of a servo's form was held fixed while its lateness changed, the elevator's was 4.9 ms.
+    """
+    aircraft = load_aircraft("cdfp")
+    simulator = Simulator(aircraft, 400.0)
+    plan = parse_manoeuvre(("multisine:every=22:repeat=2",), aircraft, simulator.rate, None)
+    moves = np.column_stack([plan.surfaces(), np.zeros(plan.time.size)])
+    flown = SortieConditions(["actuator_lag:time_constant=0.03:damping=0.7"], seed=5, command_rate=100.0)
+    streams = FlightSampler(200.0, 100.0, 100.0, surfaces="commanded").record(fly_sortie(simulator, moves, flown))
+    aligned = align_streams(aircraft, streams, OnlineSettings().max_gap, "commands")
+    found = run(aircraft, OnlineSettings(), aligned.time, aligned.samples, aligned.time[-1:], commands_from=0)[-1]
+    imu = aircraft.tolerances["delays.imu"] * math.sqrt(1.0 - 2.0 / math.pi)  # of what is never early
+    clocks = math.hypot(aircraft.tolerances["delays.actuators"], imu)
+    for name, servo in found.servos.items():
+        assert servo.standard_error > 0.8 * clocks, name
+        assert abs(servo.value - 0.042) < 3.0 * servo.standard_error, name

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from sysid_node.flight.servos import Servo
-from sysid_node.online.systematic.servo_model import CUBIC, ServoModel, lateness, of_servo, rate_gain
+from sysid_node.online.systematic.servo_model import (
+    ServoModel,
+    expected_third,
+    lateness,
+    of_servo,
+    rate_gain,
+    third_slopes,
+)
 
 OMEGA = np.linspace(0.6, 12.6, 25)
 S = 1j * OMEGA
@@ -38,9 +45,30 @@ def test_a_lag_with_a_delay_has_the_third_coefficient_of_their_product():
 
 
 def test_a_moved_servo_keeps_what_the_file_says_of_the_third_coefficient():
-    stated = ServoModel(*(np.array([value]) for value in of_servo(Servo(0.04, delay=0.02))))
-    moved = stated.moved(np.array([0.01]), np.array([0.0]))
-    assert np.allclose(moved.third - stated.third, CUBIC * 0.01 * stated.curvature)
+    """A lag of 40 ms with a delay of 20 ms that is moved to be a lag of 50 ms with it. Truth: their product."""
+    before, after = of_servo(Servo(0.04, delay=0.02)), of_servo(Servo(0.05, delay=0.02))
+    stated = ServoModel(*(np.array([value]) for value in before))
+    moved = stated.moved(np.array([after[0] - before[0]]), np.array([after[1] - before[1]]))
+    assert np.allclose(moved.third - stated.third, after[2] - before[2], atol=0.005 * after[0] ** 3)
+    back = moved.moved(stated.lateness - moved.lateness, stated.curvature - moved.curvature)
+    assert back.third == pytest.approx(stated.third)
+
+
+@pytest.mark.parametrize(
+    ("lag", "delay", "damping"), [(0.05, 0.0, 0.0), (0.05, 0.02, 0.0), (0.02, 0.04, 0.0), (0.03, 0.02, 0.7)]
+)
+def test_the_third_coefficient_that_is_expected_is_that_of_ordinary_servos(lag, delay, damping):
+    """Within the 1 sigma that is stated for it, 0.05 L^3. Truth: lags with delays, multiplied out."""
+    late, curved, third = of_servo(Servo(lag, delay=delay, damping=damping))
+    assert expected_third(np.array([late]), np.array([curved])) == pytest.approx(third, abs=0.05 * late**3)
+
+
+@pytest.mark.parametrize("late", [0.005, 0.06])
+def test_the_slopes_of_the_third_coefficient_are_its_differences(late):
+    at, step = (np.array([late]), np.array([0.001])), 1e-7
+    by_lateness, by_curvature = third_slopes(*at)
+    assert by_lateness == pytest.approx((expected_third(at[0] + step, at[1]) - expected_third(*at)) / step, rel=1e-4)
+    assert by_curvature == pytest.approx((expected_third(at[0], at[1] + step) - expected_third(*at)) / step, rel=1e-4)
 
 
 def test_what_the_alignment_has_applied_is_taken_out():

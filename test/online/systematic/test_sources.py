@@ -86,5 +86,7 @@ def test_what_is_taken_out_is_bounded_about_the_expected_value(estimate: float, 
     assert found is not None
     place, estimates = found.keys.index("cg_shift.x"), np.zeros(len(found.keys))
     estimates[place] = estimate
-    last: Any = SimpleNamespace(servos=found.applied, considered=SimpleNamespace(estimate=estimates))
+    last: Any = SimpleNamespace(
+        servos=found.applied, lines=found.applied, considered=SimpleNamespace(estimate=estimates)
+    )
     assert to_take_out(found, found.applied, last)[place] == pytest.approx(taken)
