@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc
 
 from sysid_node.online.changes.excited_segments import ExcitedSegments, estimates_of
 from sysid_node.online.changes.score_test import ReferenceEstimates, ScoreTest, disagreement, score_test
@@ -229,6 +230,29 @@ def _contradicted(tests: ChangeTests, span: int, excited: ExcitedSegments, block
     found = score_test(reference, lines, tests.spectrum, tests.now - start)
     tested = (tests.full.structure.block == block) & (found.freedom >= KNOWN)
     return bool((found.chance(MARGIN)[tested] < FALSE_ALARM).any())
+
+
+def left_of_earlier_flight(tests: ChangeTests, excited_segments: list[ExcitedSegments], end: float) -> Array:
+    """(2, C) degrees of freedom, and sums of squares that the model leaves, of well-excited flight until ``end`` (s)."""
+    structure = tests.full.structure
+    left = np.zeros((2, len(structure.coefficients)))
+    for block, excited in enumerate(excited_segments):
+        reference = estimates_of(excited, tests.full, tests.now - tests.memory, end)
+        if reference is not None:
+            found = np.array([reference.uncertainty.freedom, reference.solution.residual])
+            left[:, structure.block == block] = found[:, structure.block == block]
+    return left
+
+
+def fits_worse(left: Array, before: Array, unknowns: int) -> bool:
+    """Whether a model of other ``unknowns`` cannot be that of the earlier flight, by what either leaves of it.
+
+    The likelihood ratio of two models whose noise is estimated, too (Davison, "Statistical Models", 2003, sec. 4.5).
+    """
+    freedom, squares = left
+    known = (freedom >= KNOWN) & (before[1] > 0.0)
+    ratio = float((freedom[known] * np.log(squares[known] / before[1][known])).sum())
+    return bool(chdtrc(unknowns, max(ratio / MARGIN, 0.0)) < FALSE_ALARM)
 
 
 def compare(
