@@ -252,7 +252,7 @@ def fits_worse(left: Array, before: Array, unknowns: int) -> bool:
     freedom, squares = left
     known = (freedom >= KNOWN) & (before[1] > 0.0)
     ratio = float((freedom[known] * np.log(squares[known] / before[1][known])).sum())
-    return bool(chdtrc(unknowns, max(ratio / MARGIN, 0.0)) < FALSE_ALARM)
+    return bool(chdtrc(unknowns, max(ratio / MARGIN, 0.0)) < SIGNIFICANCE)
 
 
 def compare(
