@@ -11,7 +11,15 @@ from plant import TRUTH, exact_flight, fly, made_aircraft, multisteps
 
 from sysid_node.aircraft.model import UncertainValue
 from sysid_node.online import estimator
-from sysid_node.online.changes.detection import SPANS, ChangeMonitor, ChangeTests, compare
+from sysid_node.online.changes.detection import (
+    KNOWN,
+    SIGNIFICANCE,
+    SPANS,
+    ChangeMonitor,
+    ChangeTests,
+    compare,
+    fits_worse,
+)
 from sysid_node.online.changes.excited_segments import estimates_of, no_excited_segments, remember
 from sysid_node.online.changes.score_test import ReferenceEstimates
 from sysid_node.online.frequency.regression_signals import SignalLayout
@@ -249,3 +257,21 @@ def test_earlier_manoeuvres_contradict_what_is_far_from_them() -> None:
 def test_least_squares_contradicts_nothing_that_was_solved_for_by_instruments() -> None:
     """Gusts bias it, and not those."""
     assert not compared(True, 0.5).any()
+
+
+def test_servos_are_refuted_by_what_they_leave_of_earlier_flight() -> None:
+    """The likelihood ratio of fits of noise by q further unknowns has the chi-squared distribution (Wilks, 1938)."""
+    rng, many, freedom, unknowns = np.random.default_rng(11), 4000, 80, 3
+    noise = rng.normal(size=(many, 2, freedom))
+    known = np.full((2, 1), float(freedom))
+    with_them, without = (noise**2).sum(axis=-1), (noise[..., unknowns:] ** 2).sum(axis=-1)
+    refuted = [
+        fits_worse(np.array([known[:, 0], more]), np.array([known[:, 0], less]), 2 * unknowns)
+        for more, less in zip(with_them, without, strict=True)
+    ]
+    assert np.mean(refuted) < SIGNIFICANCE
+    few = np.full(2, KNOWN - 1.0)
+    left, before = np.array([known[:, 0], [3.0, 1.0]]), np.array([known[:, 0], [1.0, 1.0]])
+    assert fits_worse(left, before, 2 * unknowns)
+    assert not fits_worse(before, left, 2 * unknowns)
+    assert not fits_worse(np.array([few, [3.0, 1.0]]), np.array([few, [1.0, 1.0]]), 2 * unknowns)
