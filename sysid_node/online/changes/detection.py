@@ -233,7 +233,7 @@ def _contradicted(tests: ChangeTests, span: int, excited: ExcitedSegments, block
 
 
 def left_of_earlier_flight(tests: ChangeTests, excited_segments: list[ExcitedSegments], end: float) -> Array:
-    """(2, C) degrees of freedom, and sums of squares that the model leaves, of well-excited flight until ``end`` (s)."""
+    """(2, C) degrees of freedom, and sums of squares that are left, of well-excited flight until ``end`` (s)."""
     structure = tests.full.structure
     left = np.zeros((2, len(structure.coefficients)))
     for block, excited in enumerate(excited_segments):
