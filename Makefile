@@ -4,7 +4,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo loop install docs test lint format build bench fuzz clean distclean
+.PHONY: help demo loop install docs test slow lint format build bench fuzz clean distclean
 
 VENV ?= .venv
 RATE ?= 1
@@ -44,8 +44,11 @@ docs: $(DONE)/run $(DONE)/desk $(DONE)/docs  ## the documentation as a site, out
 	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d out/docs/.doctrees docs out/docs
 	@echo "out/docs/index.html"
 
-test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev $(DONE)/docs $(DONE)/view  ## run all tests; ARGS="test/online -x" runs some
-	@$(BIN)/python -m pytest -n 3 --dist loadfile $(ARGS)
+test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev $(DONE)/docs $(DONE)/view  ## run the tests, but for the slow ones; ARGS="test/online -x" runs some
+	@$(BIN)/python -m pytest -n 3 --dist loadfile -m "not slow" $(ARGS)
+
+slow: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev $(DONE)/docs $(DONE)/view  ## run the slow tests: whole diagnoses, closed loops, Monte Carlo
+	@$(BIN)/python -m pytest -n 3 --dist loadfile -m slow $(ARGS)
 
 lint: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev  ## ruff and mypy --strict
 	@$(BIN)/ruff check .

@@ -69,6 +69,7 @@ def test_a_flight_says_what_it_holds(flight):
     assert {axis.title.text for axis in flight.plot().select_yaxes()} >= {"deg", "deg/s", "m/s"}
 
 
+@pytest.mark.slow
 def test_a_replay_finds_the_truth_and_prints_it(replayed):
     """The truth of a simulated flight lies in most 95 % intervals (27 of them; five misses have odds of 1 in 100)."""
     valid = [d for d in replayed.derivatives.values() if d.valid]
@@ -91,6 +92,7 @@ def test_a_figure_shows_the_estimates_as_the_report_does(replayed):
     assert drawn[-1] == pytest.approx(replayed.derivatives["Cm_alpha"].value, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_an_identification_draws_its_fit_by_default(identified):
     found = identified.derivatives["Cm_alpha"]
     assert found.valid and found.lower <= TRUTH["Cm_alpha"] <= found.upper
@@ -99,6 +101,7 @@ def test_an_identification_draws_its_fit_by_default(identified):
         identified.plot("estimates")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [["replay", "--set", "publish_rate=1"], ["identify", "--method", "equation_error"]])
 def test_what_is_saved_is_what_the_command_writes(command, log, identified, tmp_path):
     name, *options = command
@@ -111,6 +114,7 @@ def test_what_is_saved_is_what_the_command_writes(command, log, identified, tmp_
         assert (tmp_path / "api" / file.name).read_bytes() == file.read_bytes(), file.name
 
 
+@pytest.mark.slow
 def test_a_smooth_flight_held_out_is_read_as_the_commands_that_it_holds(tmp_path):
     """Steps show commands, a multisine does not; both flights were recorded alike, with servos of 0.1 s."""
     for name, manoeuvre in (("steps", "3211"), ("smooth", "multisine")):
@@ -122,6 +126,7 @@ def test_a_smooth_flight_held_out_is_read_as_the_commands_that_it_holds(tmp_path
     assert min(held_out["Cl"]["r_squared"], held_out["Cm"]["r_squared"]) > 0.95  # below zero as positions
 
 
+@pytest.mark.slow
 def test_offsets_are_not_excited_where_a_control_does_not_move(flight, tmp_path):
     """An elevator that stays where it is cannot be told from an offset."""
     record = flight.record.between(0.0, 24.0)
@@ -132,6 +137,7 @@ def test_offsets_are_not_excited_where_a_control_does_not_move(flight, tmp_path)
     assert found["Cl_p"].valid
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("work", [identify_simply, replay])
 def test_a_surface_that_is_counted_the_other_way_is_said(flight, tmp_path, work):
     record = flight.record.between(0.0, 30.0)

@@ -57,6 +57,7 @@ def test_what_is_indivisible_is_finished_first(tmp_path):
     assert (tmp_path / "whole").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "word"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "terminated")])
 def test_a_command_leaves_nothing_half_written(number, word):
     with tempfile.TemporaryDirectory() as place:

@@ -192,6 +192,7 @@ def test_online_imports_numpy_and_scipy_only() -> None:
     assert foreign <= {"sysid_node", *ONLINE_PACKAGES}
 
 
+@pytest.mark.slow
 def test_nodes_in_flight_need_no_library_beyond_ros_numpy_scipy_and_yaml() -> None:
     """What apt and rosdep install is enough to identify in flight: the nodes together load nothing else."""
     nodes = ", ".join(f"sysid_node.ros.{n}" for n in ("identifier", "adaptive_controller", "exciter", "fault_monitor"))

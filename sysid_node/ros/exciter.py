@@ -176,10 +176,19 @@ class Exciter(LoopNode):
     def _on_start(self, _: Any, response: Any) -> Any:
         try:
             exciter.start(self._state, self._now, self._limited())
-            response.success, response.message = True, f"until {', '.join(self._state.settings.derivatives)} are known"
+            until = f"until {', '.join(self._state.settings.derivatives)} are known"
+            response.success, response.message = True, f"{until}{self._unheard()}"
         except InputError as error:
             response.success, response.message = False, str(error)
         return response
+
+    def _unheard(self) -> str:
+        """That no surface will move, which the log says too; empty where somebody listens."""
+        if self._excitation.get_subscription_count():
+            return ""
+        words = f"nobody listens to {self._excitation.topic_name}, so no surface will move"
+        self.get_logger().warning(words)
+        return f"; {words}"
 
     def _on_stop(self, _: Any, response: Any) -> Any:
         exciter.stop(self._state, self._now, "stopped on request")

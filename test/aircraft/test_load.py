@@ -136,6 +136,7 @@ MISTAKES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("old", "new", "expected"), MISTAKES, ids=[m[2][-1][:40] for m in MISTAKES])
 def test_a_mistake_gets_one_line_that_names_it(old, new, expected):
     assert old in GOOD
@@ -185,6 +186,7 @@ def test_dump_keeps_what_is_not_given():
     assert repr(again) == repr(aircraft)  # NaN is not equal to itself, but prints the same
 
 
+@pytest.mark.slow
 @given(name=st.text(min_size=1).filter(str.strip), source=st.text().filter(lambda s: not s or s.strip()))
 def test_dump_survives_any_text(name, source):
     aircraft = replace(parse_aircraft(GOOD), name=name, source=source)

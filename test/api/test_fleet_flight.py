@@ -13,6 +13,7 @@ from sysid_node.fleet.outcome import FleetSettings, FlightTask
 from sysid_node.flight.bag.writer import write_streams
 
 
+@pytest.mark.slow
 def test_a_batch_methods_systematic_error_is_no_statistical_one(tmp_path: Path) -> None:
     write_streams(tmp_path / "a", made_streams(12.0))
     (tmp_path / "made.yaml").write_text(dump_aircraft(made_aircraft()))

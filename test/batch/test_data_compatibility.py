@@ -31,6 +31,7 @@ def found(spoilt):
     return check_sensors(KESTREL, [spoilt])
 
 
+@pytest.mark.slow
 def test_errors_are_found_within_their_intervals(found):
     for name, estimate in found.fit.estimates.items():
         assert abs(estimate.value - ERRORS.get(name, 0.0)) < 4.0 * estimate.standard_error + 1e-4, name
@@ -46,6 +47,7 @@ def test_corrected_flights_are_nearer_to_the_truth(found, spoilt):
         assert after < 0.6 * before, name
 
 
+@pytest.mark.slow
 def test_good_sensors_are_left_alone():
     fit = check_sensors(KESTREL, [flight(2)]).fit
     scores = [e.value / e.standard_error for e in fit.estimates.values()]

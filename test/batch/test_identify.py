@@ -24,6 +24,7 @@ def found(request):
     return identify(request.param, KESTREL, [flight(1)], QUICK, [flight(2, turn=-1)])
 
 
+@pytest.mark.slow
 def test_every_method_finds_the_truth(found):
     assert found.fit.search.converged
     assert set(found.fit.estimates) == set(TRUTH)
@@ -40,6 +41,7 @@ def test_every_method_answers_a_held_out_flight(found):
     assert all(figures["r_squared"] > 0.9 for output, figures in outputs.items() if output not in ("CD", "ax", "V"))
 
 
+@pytest.mark.slow
 def test_filter_error_on_two_states_that_the_others_are_measured_for():
     settings = dataclasses.replace(QUICK, states=("alpha", "q"))
     found = identify("filter_error", KESTREL, [flight(1)], settings, [flight(2, turn=-1)])
@@ -57,6 +59,7 @@ def test_output_error_is_the_sharpest_on_still_air():
     assert errors["output_error"] < 0.5 * errors["equation_error"]
 
 
+@pytest.mark.slow
 def test_a_flight_without_a_sideslip_vane_can_still_be_integrated():
     found = identify("output_error", KESTREL, [without(flight(1), "beta")], QUICK)
     assert any("started from the aircraft file's values" in remark for remark in found.fit.remarks)
@@ -71,6 +74,7 @@ def test_longitudinal_motion_alone():
     assert np.abs(scores(fit.estimates)).max() < 6.0
 
 
+@pytest.mark.slow
 def test_stepwise_and_sensor_correction_are_told():
     settings = dataclasses.replace(QUICK, stepwise=True, correct_sensors=True)
     found = identify("equation_error", KESTREL, [flight(1)], settings)

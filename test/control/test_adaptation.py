@@ -79,6 +79,7 @@ def test_estimates_equal_to_the_file_change_nothing(state: controller.Controller
         np.testing.assert_allclose(axis.flown.gains, axis.axis.baseline, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_surface_of_less_effect_gets_more_gain() -> None:
     """Gains in the moments that they make stay what they were: 1 / 0.4 of the baseline's."""
     state, _ = weakened()
@@ -144,6 +145,7 @@ def unstable() -> dict[str, IdentifiedDerivative]:
     return {name: IdentifiedDerivative(v, v - h, v + h, True, 1.0) for name, (v, h) in UNSTABLE.items()}
 
 
+@pytest.mark.slow
 def test_an_unstable_aircraft_is_adapted_to_where_it_is_known_how_errors_go_together() -> None:
     """The corners of five separate intervals are 4.4 standard errors away, where nothing can be flown with margins."""
     separate, joint = controller.init(AIRCRAFT, ControllerSettings()), _adapted_to_the_unstable()

@@ -70,6 +70,7 @@ def fly(
     return state, now
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("points", "columns", "wanted", "within"),
     [
@@ -90,6 +91,7 @@ def test_a_pitch_rate_is_tracked() -> None:
     assert now.outputs[4] == pytest.approx(0.1, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_disturbance_is_integrated_away() -> None:
     """A constant deflection on top of the command, as a trim error: pitch comes back to where it should be."""
     _, now = fly(SetPoints(pitch=0.1), 10.0, excitation=0.02)

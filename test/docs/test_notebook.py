@@ -9,6 +9,7 @@ from short_bags import short_bag
 from snippets import ROOT
 
 
+@pytest.mark.slow
 def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """On the first half of its flight, to be quick."""
     (tmp_path / "bags").mkdir()

@@ -32,6 +32,14 @@ def name_of(page: Path) -> str:
 #: Pages that state nothing of what their flights give: the beginning of these flights does as well.
 SHORT = ("docs/python_api.md", "docs/how-to/batch.md")
 
+#: Pages that take more than three seconds.
+SLOW = (
+    *("README.md", "docs/python_api.md", "docs/explanation/faults.md", "docs/start/own_aircraft.md"),
+    *("docs/start/slow_servos.md", "docs/how-to/aircraft_file.md", "docs/how-to/batch.md", "docs/how-to/manoeuvre.md"),
+    *("docs/how-to/import_model.md", "docs/how-to/new_estimator.md", "docs/how-to/own_simulator.md"),
+    *("docs/how-to/record_and_replay.md",),
+)
+
 
 class Desk:
     """A folder with the bundled bags and aircraft, in which pages are worked through; a command is run once."""
@@ -100,7 +108,9 @@ def short_desk(tmp_path_factory: pytest.TempPathFactory) -> Desk:
     return Desk(tmp_path_factory.mktemp("short_desk"), bags)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name_of)
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, marks=[pytest.mark.slow] * (name_of(page) in SLOW), id=name_of(page)) for page in PAGES]
+)
 def test_what_the_page_shows_can_be_done(
     page: Path, desk: Desk, short_desk: Desk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -125,6 +135,10 @@ def test_the_five_lines_of_the_python_interface_run(short_desk: Desk, monkeypatc
     assert type(names["figure"]).__name__ == "Figure"
     gap: Any = names["gap"]
     assert gap.verdict == "no_gap"  # the simulator made the bundled flight
+
+
+def test_slow_pages_exist() -> None:
+    assert set(SLOW) <= set(map(name_of, PAGES))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)

@@ -31,6 +31,7 @@ def optimum(predictor):
     return optimise(predictor, parse_segments(START, CDRW), DURATION, evaluations=40)
 
 
+@pytest.mark.slow
 def test_the_error_falls(optimum):
     assert optimum.cost_best < 0.6 * optimum.cost_start
     assert 30 < optimum.evaluations < 100

@@ -46,6 +46,7 @@ def fly(predictor, commands, unknowns):
     return *fixed, unknowns, predictor.trim.initial, padded(commands), simulator.step, simulator.neutral()
 
 
+@pytest.mark.slow
 def test_monte_carlo_scatter_is_what_was_predicted(predictor, prediction):
     """Thirty noisy flights, each fitted by two steps of Gauss-Newton from a start off by a sixtieth of the tolerances.
 
@@ -155,6 +156,7 @@ def test_an_airspeed_that_cannot_be_trimmed_is_an_error():
         Predictor(CDRW, RATE, airspeed=3.0)
 
 
+@pytest.mark.slow
 def test_a_flight_too_long_for_an_unstable_aircraft_is_an_error():
     """The sensitivities grow as exp(t / T) along the unstable mode; their squares leave the range of numbers."""
     with pytest.raises(InputError, match=r"has an unstable mode, .*; give a shorter duration"):

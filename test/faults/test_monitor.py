@@ -55,6 +55,7 @@ def damaged(d: dict[str, float], x: dict[str, float]) -> tuple[dict[str, float],
     return d | {"Cm_q": 0.5 * d["Cm_q"], "Cm_alpha": 0.65 * d["Cm_alpha"]}, x
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("truth", "kind", "part", "size"),
     [
@@ -91,6 +92,7 @@ def test_damage_names_the_derivatives_that_changed() -> None:
     assert change.lower <= -0.35 * AIRCRAFT.derivatives["Cm_alpha"].value <= change.upper
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("truth", [stuck("de", 0.05), stuck("da", -0.1), lost("de", 0.6), lost("dr", 0.6)])
 @pytest.mark.parametrize("seed", [15, 16])
 def test_a_surface_is_never_called_damage(seed: int, truth: Truth) -> None:
@@ -116,6 +118,7 @@ def test_a_jammed_vane() -> None:
     assert (state.fault.kind, state.fault.part) == (VANE_STUCK, "alpha"), state.fault.text
 
 
+@pytest.mark.slow
 # rad; without any, where what is read no longer comes from the vane
 @pytest.mark.parametrize(("seed", "noise"), [(11, 0.001), (13, 0.0)])
 def test_a_jammed_vane_while_nothing_else_moves(seed: int, noise: float) -> None:
@@ -148,6 +151,7 @@ def test_a_vane_that_reads_its_noise_where_the_angle_rests_has_not_failed() -> N
         assert state.fault is None, state.fault.text
 
 
+@pytest.mark.slow
 def test_nothing_is_found_where_nothing_failed() -> None:
     """Two minutes; by chance one in a thousand of such flights may raise an alarm (``false_alarms``)."""
     state, maker = monitored(seed=1)
@@ -155,6 +159,7 @@ def test_nothing_is_found_where_nothing_failed() -> None:
         assert fly(state, maker, 10.0) is None
 
 
+@pytest.mark.slow
 def test_rougher_air_is_no_fault() -> None:
     state, maker = monitored(seed=6)
     fly(state, maker, 60.0)
@@ -162,6 +167,7 @@ def test_rougher_air_is_no_fault() -> None:
         assert fly(state, maker, 10.0, rough=3.0) is None
 
 
+@pytest.mark.slow
 def test_the_alarm_ends_with_the_fault() -> None:
     state, maker = flown(seed=7)
     assert fly(state, maker, 4.0, lost("de", 0.6)) is not None
@@ -169,6 +175,7 @@ def test_the_alarm_ends_with_the_fault() -> None:
     assert fly(state, maker, 6.0, lost("de", 0.6)) is not None
 
 
+@pytest.mark.slow
 def test_a_fault_stands_while_nothing_moves_that_would_show_it() -> None:
     """Level flight for 22 s, longer than blocks are remembered; then the elevator has its effect again."""
     state, maker = flown(seed=7)
@@ -189,6 +196,7 @@ def test_a_gap_is_bridged_without_an_alarm() -> None:
     assert fly(state, maker, 20.0) is None
 
 
+@pytest.mark.slow
 def test_a_gap_while_a_fault_is_followed() -> None:
     state, maker = flown(seed=12)
     assert fly(state, maker, 6.0, lost("de", 0.6)) is not None
@@ -200,6 +208,7 @@ def test_a_gap_while_a_fault_is_followed() -> None:
     assert (fault.kind, fault.part) == (LOSS, "elevator"), fault.text
 
 
+@pytest.mark.slow
 def test_the_last_good_derivatives_are_held() -> None:
     """What the identifier says is taken up ten seconds later, and nothing that comes after an alarm."""
     state, maker = flown(seed=9)
@@ -239,6 +248,7 @@ def commanded(seed: int, lateness: float, error: float = 0.006) -> tuple[Monitor
     return state, maker
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slower", [0.05, 0.1])
 def test_a_servo_that_becomes_slower_is_named_by_how_much(slower: float) -> None:
     state, maker = commanded(21, 0.03)

@@ -50,6 +50,7 @@ def shortened(flight: Streams, begin: float, end: float) -> Streams:
     )
 
 
+@pytest.mark.slow
 def test_the_failure_that_was_flown_is_found(verdict: FaultVerdict) -> None:
     (episode,) = verdict.episodes
     fault = episode.fault
@@ -59,6 +60,7 @@ def test_the_failure_that_was_flown_is_found(verdict: FaultVerdict) -> None:
     assert 36.0 < verdict.judged < 40.0
 
 
+@pytest.mark.slow
 def test_it_is_what_the_live_functions_say_message_by_message(flight: Streams, verdict: FaultVerdict) -> None:
     """In the order of arrival, with a look every tenth of a second: the same, to the last bit."""
     watch, speech, said = watching.init(AIRCRAFT, FaultMonitorSettings(), 0.5), watching.Announcements(), []

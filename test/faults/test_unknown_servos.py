@@ -21,6 +21,7 @@ def verdict_on(bag: Path, *flown: str) -> FaultVerdict:
     return found
 
 
+@pytest.mark.slow
 def test_half_of_an_elevator_is_found_beside_them_and_no_damage_before(tmp_path: Path) -> None:
     """The identifier knows the servos' times only at the end of what the monitor has learned from."""
     lost = "control_effectiveness_loss:elevator=0.5:onset=34"

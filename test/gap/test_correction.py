@@ -10,6 +10,7 @@ from sysid_node.gap.document import document
 from sysid_node.sim import Simulator
 
 
+@pytest.mark.slow
 def test_causes_are_among_the_effects_of_the_corrected_file(lagging) -> None:
     (cause,) = document(lagging)["causes"]
     lag = corrected_aircraft(lagging).effects["actuator_lag"]

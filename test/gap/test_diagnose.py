@@ -30,6 +30,7 @@ def test_the_gap_closes_on_flight_held_out(lagging) -> None:
     assert gap.ci95[0] <= gap.shrink_percent <= gap.ci95[1]
 
 
+@pytest.mark.slow
 def test_its_report_is_drawn_and_fits_every_width(lagging, tmp_path, browse, fit_everywhere) -> None:
     report = tmp_path / "gap" / "report.html"
     report.parent.mkdir()
@@ -41,6 +42,7 @@ def test_its_report_is_drawn_and_fits_every_width(lagging, tmp_path, browse, fit
     fit_everywhere(report)
 
 
+@pytest.mark.slow
 def test_servos_slower_than_the_file_says_are_named_and_the_corrected_file_leaves_no_gap(aircraft) -> None:
     """A single flight with each manoeuvre once is checked on its parts, each of which then holds what no other does.
 
@@ -61,6 +63,7 @@ def test_servos_slower_than_the_file_says_are_named_and_the_corrected_file_leave
     assert diagnose(corrected, [other], []).verdict == "no_gap"
 
 
+@pytest.mark.slow
 def test_tolerances_are_no_gap(aircraft, wrong_derivatives) -> None:
     flight = fly(aircraft, {"derivative_error": wrong_derivatives}, seed=7)
     assert diagnose(aircraft, [flight], []).verdict == "no_gap"

@@ -21,6 +21,7 @@ TRUTH = [d.value for d in load_aircraft("cdrw").derivatives.values()]
 FLIGHTS = range(1, 9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("turbulence", "method", "valid", "hold"),
     [
@@ -39,6 +40,7 @@ def test_intervals_hold_the_truth(turbulence, method, valid, hold):
     assert sum(v.far for v in verdicts) <= 0.005 * sum(v.valid for v in verdicts)
 
 
+@pytest.mark.slow
 def test_estimates_stay_valid_where_surfaces_only_answer_gusts():
     """Multisines for 20 s, then straight flight on the autopilot: what was learned stays valid, and holds."""
     sines = "multisine:elevator,aileron,rudder:amplitude=0.06,0.06,0.12:length=20:low=0.1:high=2:start=0.7"
@@ -49,6 +51,7 @@ def test_estimates_stay_valid_where_surfaces_only_answer_gusts():
     assert inside[found[..., VALID] > 0.0].mean() > 0.9
 
 
+@pytest.mark.slow
 def test_gusts_that_surfaces_answer_are_not_taken_for_delays():
     """No instrument and no servo is late, which the estimator does not know. Truth: the aircraft file.
 
@@ -64,6 +67,7 @@ def test_gusts_that_surfaces_answer_are_not_taken_for_delays():
     assert np.mean(np.array(hold)[valid]) > 0.9
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_bias_of_least_squares_where_instruments_of_one_axis_are_weak():
     """Elevator and rudder are moved on purpose, and the ailerons only answer gusts. Truth: the aircraft file.
 

@@ -60,6 +60,7 @@ def left_out(state: EstimatorState) -> int:
     return sum(state.inputs.incomplete.values())
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.tuples(st.integers(0, len(TIME) - 1), st.integers(0, WIDTH - 1), anything), max_size=40),
     st.sampled_from(METHODS),

@@ -47,6 +47,7 @@ def test_twin_otter_coefficients_are_sidpacs(otter, flights):
         assert abs(errors_off(found[name], reference)) < 1.0, name
 
 
+@pytest.mark.slow
 def test_attas_is_that_of_the_frequency_transform_regression(flights):
     boom, known = attas.at_boom(attas.flown(flights)), aircraft.attas(flights)
     regressed = attas.rates(boom)
@@ -56,6 +57,7 @@ def test_attas_is_that_of_the_frequency_transform_regression(flights):
         assert abs(errors_off(replayed[name], reference)) < 2.0, name
 
 
+@pytest.mark.slow
 def test_hfb320_lift_is_that_of_filter_error_and_not_of_output_error(flights):
     found = replay(hfb320.flown(flights), aircraft.hfb320(flights), frequencies=hfb320.GRID).derivatives["CL_alpha"]
     for reference in (references.HFB_FILTER_ERROR, references.HFB_EKF):
@@ -63,6 +65,7 @@ def test_hfb320_lift_is_that_of_filter_error_and_not_of_output_error(flights):
     assert found.value - references.HFB_OUTPUT_ERROR["CL_alpha"].value > 4.0 * found.error
 
 
+@pytest.mark.slow
 def test_hfb320_damping_hangs_on_when_alpha_was_measured(flights):
     """With the angle of attack 0.1 s earlier, pitch damping and elevator are those of filter error."""
     flight, known = hfb320.flown(flights), aircraft.hfb320(flights)
@@ -83,6 +86,7 @@ def test_thors_surfaces_follow_their_commands_late(flights):
     assert lag < 0.0
 
 
+@pytest.mark.slow
 def test_thors_roll_by_least_squares_is_not_surely_wrong(flights):
     """By a file of 15 derivatives with wide tolerances. Truth: the University of Minnesota's simulator of it.
 

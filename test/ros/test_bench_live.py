@@ -9,6 +9,7 @@ import pytest
 from harness import ROOT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told", [signal.SIGTERM, signal.SIGINT], ids=str)
 def test_told_to_stop_it_ends_without_a_traceback(ros: None, told: signal.Signals) -> None:
     """Exit code 0, as run_program promises; what it started ends too, else its output would never end."""

@@ -91,6 +91,7 @@ def tracks(watch: LoopWatch, rows: int = 200) -> bool:
     return len(errors) == rows and float(np.nanmax(np.abs(errors))) < TRACKS
 
 
+@pytest.mark.slow
 def test_nodes_die_and_come_back_and_the_aircraft_flies_on(watch: LoopWatch) -> None:
     nodes = {name: begin(name) for name in (SIMULATOR, IDENTIFIER, EXCITER, CONTROLLER)}
     with flying(**nodes) as loop:
@@ -157,6 +158,7 @@ class Relay:
         self.node.destroy_node()
 
 
+@pytest.mark.slow
 def test_lost_messages_and_a_silent_sensor(watch: LoopWatch) -> None:
     remaps = [f"{topic}:=raw/{topic}" for topic in ("imu/data", "air_data", "actuators")]
     relay = Relay()
@@ -177,6 +179,7 @@ def test_lost_messages_and_a_silent_sensor(watch: LoopWatch) -> None:
     relay.close()
 
 
+@pytest.mark.slow
 def test_the_simulator_flies_and_refuses_nonsense(watch: LoopWatch) -> None:
     heard: list[Imu] = []
     node = rclpy.create_node("listener")
@@ -199,6 +202,7 @@ def test_the_simulator_flies_and_refuses_nonsense(watch: LoopWatch) -> None:
     node.destroy_node()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "parameter", "words"),
     [

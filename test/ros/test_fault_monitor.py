@@ -66,6 +66,7 @@ def until(watch: LoopWatch, listener: Listener, condition: Callable[[], bool], p
         listener.executor.spin_once(timeout_sec=0.02)
 
 
+@pytest.mark.slow
 def test_what_fails_in_the_loop_is_said(heard: tuple[LoopWatch, Listener]) -> None:
     """A jammed servo shows in its position; a lost effect only in the forces; a dead sensor in its silence."""
     watch, listener = heard
@@ -91,6 +92,7 @@ def test_what_fails_in_the_loop_is_said(heard: tuple[LoopWatch, Listener]) -> No
         nodes["flight_simulator"].returncode = 0
 
 
+@pytest.mark.slow
 def test_messages_that_are_rejected_are_no_sound_flight(probe: Probe) -> None:
     """It had said that nothing has failed, or that it learns, while each message of the IMU was left out."""
     said: list[str] = []

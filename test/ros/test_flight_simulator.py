@@ -1,9 +1,11 @@
 """The flight simulator beside another that publishes /clock: truth is which clocks there are."""
 
+import pytest
 from harness import Probe, ended, start
 from rosgraph_msgs.msg import Clock
 
 
+@pytest.mark.slow
 def test_a_second_clock_is_said(probe: Probe) -> None:
     """All nodes with use_sim_time would hear the times of both flights by turns."""
     said: list[str] = []

@@ -205,6 +205,7 @@ def last(client: Client) -> dict[str, float]:
     return client.commands[-1][1]
 
 
+@pytest.mark.slow
 def test_excitation_is_bounded_and_leaves_nothing_behind(client: Client) -> None:
     """1e308 rad for 0.3 s used to keep the elevator away for 35 s. Half a second later it is where it was."""
     before = last(client)["elevator"]
@@ -260,6 +261,7 @@ def test_whatever_is_sent_commands_stay_within_the_limits(
     assert all(process.poll() is None for process in vehicles.processes.values())
 
 
+@pytest.mark.slow
 def test_set_points_of_a_best_effort_publisher_are_flown_until_they_expire(client: Client) -> None:
     client.until(lambda: abs(client.tracking.get("roll", 1.0)) < 0.01)
 
@@ -284,6 +286,7 @@ def test_one_pitch_rate_does_not_move_the_reference_for_ever(client: Client) -> 
     assert client.tracking["pitch"] <= 0.4 + 1e-6
 
 
+@pytest.mark.slow
 def test_a_misspelt_set_point_is_said(client: Client, vehicles: Vehicles) -> None:
     words = "/uav1/set_points: set-point 'rol' is not known: left out; did you mean 'roll'?"
 
@@ -294,6 +297,7 @@ def test_a_misspelt_set_point_is_said(client: Client, vehicles: Vehicles) -> Non
     client.until(said)
 
 
+@pytest.mark.slow
 def test_a_set_point_in_degrees_is_said(client: Client, vehicles: Vehicles) -> None:
     """The limit is flown; nothing had said so."""
     words = "/uav1/set_points: set-point 'roll' of 20 rad is beyond -0.8 to 0.8 rad: the limit is flown"
@@ -336,6 +340,7 @@ def test_stamps_that_stand_still_count_as_silence(client: Client, vehicles: Vehi
     client.until(lambda: words not in client.said(CONTROLLER))
 
 
+@pytest.mark.slow
 def test_silence_is_said_under_the_resolved_name(client: Client, vehicles: Vehicles) -> None:
     client.flies = False
     client.until(lambda: "/uav1/imu/data silent" in client.said(CONTROLLER))
@@ -482,6 +487,7 @@ def test_changes_of_what_is_flown_and_limits_reached_are_in_the_log(client: Clie
     client.flies = True
 
 
+@pytest.mark.slow
 def test_a_simulator_that_diverges_says_so_is_silent_and_can_be_reset(client: Client, vehicles: Vehicles) -> None:
     value = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value="cg_shift:x=-2")
     request = SetParameters.Request(parameters=[Parameter(name="effects", value=value)])

@@ -190,6 +190,7 @@ def sound(message: DerivativeEstimates, after: int) -> bool:
     return conversion.stamp_ns(message.header.stamp) > after and not stale
 
 
+@pytest.mark.slow
 def test_whatever_is_sent_on_all_topics_a_sound_flight_is_identified_afterwards(nodes: Nodes) -> None:
     @EXAMPLES
     @given(

@@ -82,6 +82,7 @@ def bits(estimates: Estimates) -> list[object]:
     return [[x.hex() if isinstance(x, float) else x for x in row] for row in rows]
 
 
+@pytest.mark.slow
 def test_a_bag_through_dds_gives_what_the_desk_gives_to_the_last_bit(probe: Probe, tmp_path: Path) -> None:
     bag = tmp_path / "multistep"
     write_streams(bag, beginning(read_streams(ROOT / "bags" / "cdrw_multistep"), SECONDS))
@@ -114,6 +115,7 @@ def test_a_bag_through_dds_gives_what_the_desk_gives_to_the_last_bit(probe: Prob
     assert all(map(math.isnan, gap.servo_time_in_file)), "the file says nothing of them"
 
 
+@pytest.mark.slow
 def test_bad_messages_are_counted_and_survived(probe: Probe) -> None:
     """NaN, degrees, broken messages, stamps repeated, reversed and absent, a clock that leaps: each is named, and the
     flight goes on.
@@ -153,6 +155,7 @@ def test_bad_messages_are_counted_and_survived(probe: Probe) -> None:
         assert process.poll() is None
 
 
+@pytest.mark.slow
 def test_an_imu_that_is_interrupted_every_second_is_said(probe: Probe) -> None:
     """On /diagnostics and in the log: else all derivatives would converge for ever, without a reason."""
     flight = made_up_streams(60.0)
@@ -178,6 +181,7 @@ def test_a_second_publisher_of_an_input_is_said(probe: Probe) -> None:
     probe.node.destroy_publisher(second)
 
 
+@pytest.mark.slow
 def test_wrong_joints_are_said_with_what_was_expected_and_what_came(probe: Probe) -> None:
     """In a namespace: its names carry it, on /diagnostics and in the log."""
     process = start_identifier(namespace="/uav1")
@@ -210,6 +214,7 @@ def test_wrong_joints_are_said_with_what_was_expected_and_what_came(probe: Probe
         probe.node.destroy_publisher(publisher)
 
 
+@pytest.mark.slow
 def test_what_actuators_are_taken_for_is_said_once_and_again_when_it_changes(probe: Probe) -> None:
     """Smooth joints are positions until they jump; the log and /diagnostics say both."""
     flight = made_up_streams(6.0)
@@ -227,6 +232,7 @@ def test_what_actuators_are_taken_for_is_said_once_and_again_when_it_changes(pro
     assert said[0].count("Actuators carry commands (inferred from the messages); the aircraft file states nothing") == 1
 
 
+@pytest.mark.slow
 def test_forward_right_down_messages_give_the_same_in_simulated_time(probe: Probe, tmp_path: Path) -> None:
     """With use_sim_time and /clock the lag is counted in the flight's time."""
     turned = tmp_path / "frd"
@@ -253,6 +259,7 @@ def correlation_heard_late(probe: Probe) -> EstimateCorrelation:
     return heard[0]
 
 
+@pytest.mark.slow
 def test_a_missing_topic_late_subscribers_silence_and_sigterm(probe: Probe) -> None:
     """One node's life: it names the topic that is missing, estimates, keeps what it said, and says what is stale."""
     flight = made_up_streams(5.0)
@@ -302,6 +309,7 @@ def saved(probe: Probe) -> dict[str, Any]:
     return dict(json.loads(path.read_text(encoding="utf-8")))
 
 
+@pytest.mark.slow
 def test_parameters_save_and_reset(probe: Probe, tmp_path: Path) -> None:
     """Parameters describe themselves and refuse; a folder that cannot be written is said; a reset forgets all."""
     folder = tmp_path / "made" / "here"
@@ -337,6 +345,7 @@ def test_parameters_save_and_reset(probe: Probe, tmp_path: Path) -> None:
     assert content["derivatives"]["Cm_q"].keys() == {"value", *errors, "lower", "upper", "valid", "status"}
 
 
+@pytest.mark.slow
 def test_lifecycle_by_requests(probe: Probe) -> None:
     def state() -> str:
         return probe.ask(GetState, "/identifier/get_state").current_state.label
@@ -392,6 +401,7 @@ def test_a_misspelt_parameter_and_an_aircraft_that_is_not_known_are_said(ros: No
     assert len(text.strip().splitlines()) == 2, text
 
 
+@pytest.mark.slow
 def test_malformed_ros_arguments_end_it_with_code_2(ros: None) -> None:
     process = start_identifier("aircraft:=")
     text, _ = process.communicate(timeout=60.0)

@@ -40,6 +40,7 @@ def node(ros: None) -> Iterator[Identifier]:
     one.destroy_node()
 
 
+@pytest.mark.slow
 def test_it_says_so_and_flies_again(node: Identifier, probe: Probe) -> None:
     probe.await_identifier()
     FaultySession.fails = True

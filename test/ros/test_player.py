@@ -56,6 +56,7 @@ def hear(probe: Probe, bag: Path, *options: str) -> tuple[list[Imu], list[Clock]
     return imu, clock
 
 
+@pytest.mark.slow
 def test_a_bag_is_heard_whole_in_order_with_its_own_stamps(probe: Probe, bag: Path) -> None:
     """Nobody listens to the other topics: it plays all the same after ``--wait``, in which all others are found."""
     imu, clock = hear(probe, bag, "--rate", "8", "--wait", "2", "--clock")
@@ -69,6 +70,7 @@ def test_a_bag_is_heard_whole_in_order_with_its_own_stamps(probe: Probe, bag: Pa
     assert len(times) > 1000
 
 
+@pytest.mark.slow
 def test_restamped_all_stamps_move_by_one_constant_to_now(probe: Probe, bag: Path) -> None:
     """The topics to which nobody listens are not waited for."""
     imu, _ = hear(probe, bag, "--rate", "8", "--wait", "200", "--wait-for", "/imu/data", "--restamp")

@@ -5,6 +5,7 @@ import signal
 from pathlib import Path
 
 import numpy as np
+import pytest
 from due_times import due_times
 from harness import LOSSLESS, Probe, ended, start, start_identifier
 from rcl_interfaces.msg import Log
@@ -20,6 +21,7 @@ from sysid_node.ros.support.conversion import estimates_from_message, stamp_ns
 SECONDS = 5.0
 
 
+@pytest.mark.slow
 def test_a_bag_of_the_loop_replays_to_the_same_estimates(probe: Probe, tmp_path: Path) -> None:
     """To the last bit, at every time at which both published: the same messages make the same estimates."""
     bag = tmp_path / "flight"

@@ -115,6 +115,7 @@ def test_what_actuators_are_taken_for_follows_the_messages() -> None:
     assert (stated.commanded, stated.carried()) == (False, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scale", "said"), [(1.0, False), (3.6, True)])
 def test_airspeed_in_another_unit_is_said_in_flight(session: Session, scale: float, said: bool) -> None:
     """All derivatives are wrong then, and valid: they fit the flight as well as the right ones do."""
@@ -165,6 +166,7 @@ def flown_with_rates(sign: float) -> Session:
     return session
 
 
+@pytest.mark.slow
 def test_no_estimate_is_valid_where_rates_are_in_other_axes() -> None:
     """Forward, left, up taken for forward, right, down turns the signs of q and r."""
     session = flown_with_rates(-1.0)
@@ -172,6 +174,7 @@ def test_no_estimate_is_valid_where_rates_are_in_other_axes() -> None:
     assert {one.status for one in session.now().estimates.derivatives.values()} == {"outside model"}
 
 
+@pytest.mark.slow
 def test_a_sound_flight_has_valid_estimates_and_no_sign_fault() -> None:
     session = flown_with_rates(1.0)
     assert (session.sign_fault, session.attitude_fault) == ("", "")

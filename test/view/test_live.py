@@ -84,6 +84,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     return Recorded(path)
 
 
+@pytest.mark.slow
 def test_what_was_published_is_shown_at_its_stamps(recorded: Recorded) -> None:
     time, airspeed = recorded.curve("/flight/airspeed/airspeed")
     np.testing.assert_allclose(airspeed, 20.0)

@@ -1,12 +1,14 @@
 """Recursive least squares on the filtered error."""
 
 import numpy as np
+import pytest
 from made_flight import KESTREL, KINKS, TRUTH, clean, flight, largest_error
 
 from sysid_node.batch.methods.error_filtering import error_filtering
 from sysid_node.batch.methods.recursive_least_squares import recursive_least_squares
 
 
+@pytest.mark.slow
 def test_a_filtered_error_keeps_the_noise_of_differentiation_out():
     """Accelerations of rates are the noisiest of all: the spread over flights tells."""
     spread = {}

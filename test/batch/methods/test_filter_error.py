@@ -12,6 +12,7 @@ from sysid_node.batch.models.model import ModelParameter
 from sysid_node.errors import InputError
 
 
+@pytest.mark.slow
 def test_hfb_320_agrees_with_the_published_filter_error(flights):
     case = hfb_320(flights)
     fit = filter_error(case.model, [case.manoeuvre])
@@ -31,6 +32,7 @@ def in_six_flights():
     return [(manoeuvre, filter_error(short_period_model(), [manoeuvre])) for manoeuvre in manoeuvres]
 
 
+@pytest.mark.slow
 def test_the_filter_and_the_truth_are_found():
     """The innovations show the noises by the gain alone, in which several mixtures of them are nearly the same."""
     model, manoeuvre = short_period_model(), in_gusts(np.random.default_rng(1), 40.0)
@@ -47,6 +49,7 @@ def test_the_filter_and_the_truth_are_found():
 _NOISES = (("process", ("alpha", "q")), ("sensor", ("alpha", "q", "az")))
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_in_gusts(in_six_flights):
     inside = [e.lower < SHORT_PERIOD[n] < e.upper for _, fit in in_six_flights for n, e in fit.estimates.items()]
     assert np.mean(inside) > 0.83  # 30 trials: one standard deviation is 4 %

@@ -29,6 +29,7 @@ WRONG = dataclasses.replace(
 )
 
 
+@pytest.mark.slow
 @METHODS
 def test_a_wrong_aircraft_file_is_put_right(method):
     found = identify(method, WRONG, [flight(1)], STILL, [flight(2, turn=-1)])

@@ -16,5 +16,6 @@ def test_a_network_needs_the_attitude():
         neural_gauss_newton(KESTREL, [dataclasses.replace(record, columns=blind)])
 
 
+@pytest.mark.slow
 def test_clean_flights_give_the_truth():
     assert largest_error(neural_gauss_newton(KESTREL, [clean(), clean(turn=-1)])) < KINKS

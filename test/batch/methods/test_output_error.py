@@ -67,6 +67,7 @@ def test_exact_data_give_the_exact_truth():
     assert fit.search.converged
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("colour", [0.0, 0.2], ids=["white", "coloured"])
 def test_intervals_hold_the_truth(colour):
     model, true = short_period_model(), flown(short_period_model())

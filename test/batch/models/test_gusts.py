@@ -79,6 +79,7 @@ def test_without_gusts_nothing_changes():
     assert gust_states(("q", "theta")) == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turning", [True, False], ids=["turning air", "air that does not turn"])
 def test_filter_error_finds_the_truth_in_turbulence(turning):
     settings = BatchSettings(rate=50.0, segment=0.0, states=("V", "alpha", "q", "theta"))

@@ -110,6 +110,7 @@ def test_what_the_online_estimator_does_not_know_in_gusts_is_not_valid(fit):
     assert found.status == "unconfirmed: collinear with q"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["equation_error", "frequency_equation_error", "recursive_least_squares"])
 def test_in_turbulence_valid_estimates_of_an_exact_file_hold(method):
     """By themselves a third to a half of the intervals hold, and a quarter to a half are over 4 standard errors off."""

@@ -71,6 +71,7 @@ def off(found: BatchFit) -> list[float]:
     return [abs(e.value - TRUTH[n]) / e.standard_error for n, e in found.estimates.items() if n in TRUTH and e.valid]
 
 
+@pytest.mark.slow
 def test_intervals_hold_with_a_file_that_states_what_is_off_and_not_with_a_silent_one() -> None:
     effects = {name: {key: UncertainValue(x, 0.005) for key, x in values.items()} for name, values in WRONG.items()}
     stated = off(fit(replace(late(UNCERTAIN, **DELAYS), effects=effects)))

@@ -22,12 +22,14 @@ def found():
     return identify("equation_error", UNCERTAIN, [behind_servos(1), behind_servos(2)], BatchSettings()).fit
 
 
+@pytest.mark.slow
 def test_servos_that_the_file_does_not_know(found):
     for name, servo in found.systematic.servos.items():
         assert servo.valid, name
         assert abs(servo.value - LATE) < 3.0 * servo.standard_error, name
 
 
+@pytest.mark.slow
 def test_servos_may_be_later_where_nothing_says_whether_commands_were_held(found):
     """The flights' own part is the same where commands are stated; what holding may add is in quadrature with it.
 
@@ -57,6 +59,7 @@ def test_without_servos_they_do_not():
 SLOW = ("filter_error", "extended_kalman_filter", "iterated_kalman_filter", "unscented_kalman_filter")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_finds_the_truth_behind_servos_later_than_the_file_has_them(method):
     """A flight recorded by its commands; the file states servos of 30 +- 10 ms in place of 40 ms.

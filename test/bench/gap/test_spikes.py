@@ -244,6 +244,7 @@ def test_tolerances_excuse_what_lies_within_three_of_them_and_no_more() -> None:
     assert ratio_left(RECORDS, Case(0, "hfb320", "mass_error", {"error": 0.25})) < INEXCUSABLE
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
 def test_a_file_of_another_mass_is_left_for_derivatives_that_fly_the_record() -> None:
     """By frequency both predict alike; in short flights the file is off by several times the motion.
@@ -272,6 +273,7 @@ def attributed(case: Case) -> Attribution:
     return attribute(models, nuisances, lambda share, text: None, None, held_out)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
 def test_late_commands_beside_a_lag_are_no_servo_of_second_order() -> None:
     """Both have as many parameters, and the lag and the delay predict the record better."""
@@ -282,6 +284,7 @@ def test_late_commands_beside_a_lag_are_no_servo_of_second_order() -> None:
     assert sizes["command_delay.delay"] == pytest.approx(0.09, rel=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not RECORDS.is_dir(), reason="the real flight records are not beside the project")
 def test_what_was_dropped_beside_one_cause_is_looked_for_beside_what_took_its_place() -> None:
     """Beside slow servos of all surfaces half an aileron is not needed; slow ailerons alone leave it to be found."""

@@ -4,9 +4,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[3]
 
 
+@pytest.mark.slow
 def test_damaged_input_of_every_kind_is_one_line(tmp_path):
     command = [
         sys.executable,

@@ -146,6 +146,7 @@ def taken_by(text: str) -> set[str]:
     return {name for names, words in pairs if words.startswith("yes") for name in names.split(", ")} & COMMANDS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FLIGHTS)
 def test_the_verdict_is_what_the_commands_do(tmp_path, capsys, kind):
     """Truth: the commands themselves are run; of ``gap``, whose diagnosis takes long, the reading.
@@ -201,6 +202,7 @@ def test_a_transport_is_excited_by_its_elevator(flights, capsys):
     assert "imu/data comes at 10 Hz; 20 Hz are needed of an autopilot's log" in out
 
 
+@pytest.mark.slow
 def test_methods_without_vanes_are_those_that_are_told(tmp_path, capsys):
     """Truth: a table without angle of attack is given to every method that is not told, and to one that is."""
     record = thinned(50.0, 8.0)

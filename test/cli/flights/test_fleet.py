@@ -56,6 +56,7 @@ def finished(folder: Path) -> dict[str, tuple[str, str]]:
     return {flight: (status, when) for flight, status, when in rows}
 
 
+@pytest.mark.slow
 def test_a_fleet_gives_the_replays_estimates_with_their_covariance(fleet: Path) -> None:
     found = json.loads((fleet / "out" / "fleet.json").read_text())
     assert [(f["flight"], f["tail"], f["configuration"]) for f in found["flights"]] == [
@@ -138,6 +139,7 @@ def test_a_log_that_is_there_twice_counts_once(fleet: Path, capsys: pytest.Captu
     assert "0 to do, 3 done, 1 with a fault" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_files_of_one_type_may_differ_in_all_but_the_geometry(
     fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -161,6 +163,7 @@ def test_files_of_one_type_may_differ_in_all_but_the_geometry(
     assert "another geometry" in refusal["reason"]
 
 
+@pytest.mark.slow
 def test_what_a_single_flights_command_warns_of_is_said_here_too(
     fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -31,6 +31,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
+@pytest.mark.slow
 def test_each_log_says_its_day_and_its_aircraft(out: Path) -> None:
     found = json.loads((out / "fleet.json").read_text())
     flights = {f["flight"]: (f["tail"], f["date"][:10]) for f in found["flights"]}

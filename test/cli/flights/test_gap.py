@@ -23,6 +23,7 @@ def test_a_missing_bag_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "does not exist" in said(capsys)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not BAG.is_dir(), reason="the bundled flights are not here")
 def test_a_file_without_tolerances_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = "\n".join(line.partition(", tolerance")[0] + ("}" if ", tolerance" in line else "")
@@ -92,6 +93,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_gyro_that_is_off_is_named_with_its_size(found: Path) -> None:
     gap = json.loads((found / "out" / "gap.json").read_text(encoding="utf-8"))
     assert gap["verdict"] == "explained"

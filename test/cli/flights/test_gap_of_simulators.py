@@ -46,6 +46,7 @@ def diagnosed(folder: Path, *simulator: str) -> tuple[Path, dict]:
     return out, json.loads((out / "gap.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_the_correction_is_written_into_the_jsbsim_model_and_flown_in_it(place: Path) -> None:
     out, said = diagnosed(place, "--simulator", f"jsbsim:{place / 'kestrel.xml'}")
     (cause,) = said["causes"]
@@ -60,6 +61,7 @@ def test_the_correction_is_written_into_the_jsbsim_model_and_flown_in_it(place: 
     assert "Flown in jsbsim:" in (out / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_simulator_is_known_by_its_own_flights(place: Path) -> None:
     fly(place, "simulated_first", *STEPS, "--noise", "0", "--seed", "5")
     fly(place, "simulated_second", *SMOOTH, "--noise", "0", "--seed", "6")

@@ -47,6 +47,7 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_the_summary_keeps_the_contract(summary):
     assert set(summary) >= KEYS
     assert summary["method"] == "equation_error"
@@ -58,6 +59,7 @@ def test_the_summary_keeps_the_contract(summary):
     assert summary["settings"]["stepwise"] is True
 
 
+@pytest.mark.slow
 def test_what_is_odd_about_a_flight_is_in_the_report_as_well(tmp_path):
     """Truth: a mass in hundreds of grams, with which the mean lift is not that of the flight."""
     aircraft = load_aircraft("cdrw")
@@ -67,6 +69,7 @@ def test_what_is_odd_about_a_flight_is_in_the_report_as_well(tmp_path):
     assert found.run.remarks[0] == str(told[0].message)
 
 
+@pytest.mark.slow
 def test_deflections_beyond_the_files_limits_are_warned_of(tmp_path):
     aircraft = load_aircraft("cdrw")
     controls = {name: replace(control, limit=0.01) for name, control in aircraft.controls.items()}
@@ -86,6 +89,7 @@ def test_the_bundled_flights_truth_is_found(summary):
         assert found[name]["value"] == pytest.approx(truth[name], rel=0.03), name
 
 
+@pytest.mark.slow
 def test_tolerances_servos_and_the_budget_are_those_of_the_contract(tmp_path):
     assert main(arguments(tmp_path / "out", "--quiet", bag=short_bag("cdrw_multistep", 36.0, tmp_path))) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
@@ -123,6 +127,7 @@ def short_log(tmp_path):
     return tmp_path / "short.csv"
 
 
+@pytest.mark.slow
 def test_a_rerun_leaves_no_table_of_the_run_before(tmp_path, short_log):
     out = tmp_path / "out"
     assert main(arguments(out, "--set", "stepwise=true", "--quiet", bag=short_log)) == 0
@@ -131,6 +136,7 @@ def test_a_rerun_leaves_no_table_of_the_run_before(tmp_path, short_log):
     assert not (out / "structure.csv").exists()
 
 
+@pytest.mark.slow
 def test_output_error_on_a_bag(tmp_path, capsys):
     """Pitch alone, in few samples, so that it is quick."""
     settings = ["--set", "states=alpha,q", "--set", "rate=25", "--set", "segment=10"]
@@ -147,6 +153,7 @@ def test_output_error_on_a_bag(tmp_path, capsys):
     assert pieces == {"0", "1", "2"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -207,6 +214,7 @@ def test_a_flight_that_never_moves_gives_no_number_marked_valid(tmp_path):
     assert all(d["status"] != "ok" for d in found.values() if not d["valid"])
 
 
+@pytest.mark.slow
 def test_a_kalman_filter_leaves_the_history_of_its_estimates(tmp_path):
     """One CLI run of a filter: two states at 20 Hz are enough for the files that it must leave."""
     out = tmp_path / "out"

@@ -31,6 +31,7 @@ def made(kind, folder):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ulg", "bin", "mavros"])
 def test_replay_takes(tmp_path, kind):
     """The pitching moment of the elevator, which every one of these records shows, is estimated with its sign."""
@@ -41,6 +42,7 @@ def test_replay_takes(tmp_path, kind):
     assert estimate["lower"] < estimate["upper"] < 0.0
 
 
+@pytest.mark.slow
 def test_identify_takes_a_log(tmp_path):
     path, out = made("ulg", tmp_path), tmp_path / "out"
     options = ["--aircraft", str(tmp_path / "aircraft.yaml"), "--out", str(out), "--quiet"]

@@ -128,6 +128,7 @@ def test_a_file_that_states_errors_and_delays_gives_the_same_live_and_in_a_repla
     assert not any("do not correct for" in remark for remark in silent.run.remarks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at_once", [97, 1500])
 def test_a_replay_in_pieces_is_the_whole_one(bag, replayed, tmp_path, at_once):
     """Files as bytes: estimates over time as a bag, tables, faults and what is drawn."""
@@ -240,6 +241,7 @@ def test_frame_and_topics_are_options(arguments, replayed, tmp_path, flight):
     assert frd["derivatives"] == flu["derivatives"]
 
 
+@pytest.mark.slow
 def test_what_failed_in_flight_is_in_the_terminal_the_summary_and_the_report(tmp_path, capsys):
     """The elevator of this flight loses half its effect at 30 s; the report drawn anew from the files says the same."""
     out = tmp_path / "out"
@@ -333,6 +335,7 @@ def test_settings_from_texts():
         replay_settings(settings_of(["="], None, "window=20"))
 
 
+@pytest.mark.slow
 def test_every_parameter_of_the_node_is_taken(arguments, tmp_path, capsys):
     """Axes as by the option, what matters in flight alone with a warning, and one line where a value is wrong."""
     assert main([*arguments, "--quiet", "--set", "body_frame=flu", "--set", "stale_after=2"]) == 0
@@ -379,6 +382,7 @@ def test_a_real_flight_through_the_two_commands(tmp_path, flights, capsys):
     assert found["derivatives"]["Cm_alpha"]["value"] == pytest.approx(-1.466, abs=2 * 0.018)
 
 
+@pytest.mark.slow
 def test_derivatives_are_estimated_on_top_of_the_files_tables(tmp_path):
     """A flight of ``sysid simulate`` without noise; without the tables these are 20 % off and more.
 
@@ -400,6 +404,7 @@ def test_derivatives_are_estimated_on_top_of_the_files_tables(tmp_path):
         assert found[name]["value"] == pytest.approx(plain.derivatives[name].value, rel=0.05), name
 
 
+@pytest.mark.slow
 def test_a_reading_that_stands_still_is_warned_of(tmp_path):
     """Sideslip that is always zero, as a driver leaves it that has no vane."""
     still = read_streams(short_bag("cdrw_multistep", 15.0, tmp_path))
@@ -410,6 +415,7 @@ def test_a_reading_that_stands_still_is_warned_of(tmp_path):
     assert {d.status for d in found.final.derivatives.values()} == {"stale input"}
 
 
+@pytest.mark.slow
 def test_an_imu_that_is_interrupted_every_second_is_warned_of(tmp_path):
     """Truth: a quarter of every second is missing, and nothing can be estimated from what is left."""
     whole = read_streams(short_bag("cdrw_multistep", 20.0, tmp_path))

@@ -25,6 +25,7 @@ def demo(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_it_identifies_a_bundled_flight_and_writes_the_report(tmp_path: Path) -> None:
     bag, out = short_bag("cdrw_multistep", 36.0, tmp_path), tmp_path / "out"
     done = demo(str(bag), "--rate", "3", "--out", str(out))

@@ -23,6 +23,7 @@ def loop(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_it_flies_and_writes_the_report(tmp_path: Path) -> None:
     done = loop("--seconds", "6", "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr

@@ -22,6 +22,7 @@ with viewer_beside("cdrw", folder / "flight.rrd", folder):
 """
 
 
+@pytest.mark.slow
 def test_it_ends_with_a_flight_that_runs_in_the_background(tmp_path) -> None:
     subprocess.run([sys.executable, "-c", IN_THE_BACKGROUND, str(tmp_path)], check=True, timeout=600)
     assert (tmp_path / "flight.rrd").stat().st_size > 0

@@ -29,6 +29,7 @@ def book(tmp_path_factory):
     return folder, said.getvalue()
 
 
+@pytest.mark.slow
 def test_a_folder_has_page_and_numbers(book, tmp_path, capsys):
     folder, said = book
     shutil.copytree(folder, tmp_path / "book")
@@ -43,6 +44,7 @@ def test_a_folder_has_page_and_numbers(book, tmp_path, capsys):
     assert "sysid aircraft" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_error_budget_is_that_of_a_replay_of_the_same_flight(book, tmp_path):
     """Truth: the summary of a replay of a flight by `sysid simulate`, of another seed and other rates."""
     folder, said = book

@@ -27,6 +27,7 @@ def folder(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_the_table_is_the_manoeuvre(folder):
     with (folder / "manoeuvre.csv").open() as file:
         rows = list(csv.reader(file))
@@ -80,6 +81,7 @@ def test_the_page_is_whole_and_stands_alone(folder):
     assert "doublet:rudder" in page
 
 
+@pytest.mark.slow
 def test_its_page_and_an_aircrafts_fit_every_width_light_and_dark(folder, tmp_path, fit_everywhere):
     assert main(["aircraft", "cdfp", "--out", str(tmp_path / "aircraft"), "--quiet"]) == 0
     fit_everywhere(folder / "report.html", tmp_path / "aircraft" / "report.html")

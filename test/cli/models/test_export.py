@@ -44,6 +44,7 @@ def test_the_aircraft_is_the_runs_own_and_not_one_of_its_name(run):
     assert yaml.safe_load((run / "model.yaml").read_text())["/**"]["ros__parameters"]["mass"] == 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["replay", "identify"])
 def test_a_run_is_exported_with_the_aircraft_that_it_began_with(tmp_path, method):
     """As found in use: 3 kg stand in the user's file, whose name is that of a bundled aircraft."""

@@ -183,6 +183,7 @@ def test_bundled_flights_are_listed_and_small():
         assert read_truth(BAGS / name), name
 
 
+@pytest.mark.slow
 def test_the_throttles_usual_amplitude_can_be_flown_by_excite_and_simulate(tmp_path):
     """cdrw flies level at 0.144 of full throttle: 0.15 would have to be clipped."""
     words = ["--aircraft", "cdrw", "--manoeuvre", "pulse:throttle", "--duration", "2.5", "--quiet", "--out"]

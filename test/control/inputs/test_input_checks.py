@@ -19,6 +19,7 @@ ANY = st.floats(allow_nan=True, allow_infinity=True)
 LIMITS = np.array([control.limit for control in AIRCRAFT.controls.values()])
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(excitation=st.tuples(ANY, ANY, ANY), sensed=st.tuples(*[ANY] * 9))
 def test_after_nonsense_the_command_is_soon_that_of_level_flight(
@@ -39,6 +40,7 @@ def test_after_nonsense_the_command_is_soon_that_of_level_flight(
     np.testing.assert_allclose(command[:3], trim[:3], atol=0.12)
 
 
+@pytest.mark.slow
 def test_an_aircraft_survives_any_excitation() -> None:
     """3 s of it on all surfaces: before the bound it ended at NaN."""
     simulator = Simulator(AIRCRAFT, 100.0)

@@ -61,6 +61,7 @@ def test_a_pitch_rate_stops_at_the_largest_pitch(rate: float) -> None:
 ANY = st.floats(allow_nan=True, allow_infinity=True)
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(points=st.lists(st.builds(SetPoints, ANY, ANY, ANY, ANY, ANY), min_size=1, max_size=6), w=st.floats(0.2, 20.0))
 def test_whatever_is_asked_for_the_reference_keeps_its_limits(points: list[SetPoints], w: float) -> None:

@@ -1,5 +1,6 @@
 """A tracking error that the law cannot mean is said, then the baseline is flown, until the error was small for long."""
 
+import pytest
 from flying import AIRCRAFT, LEVEL, beliefs, level
 
 from sysid_node.control import controller
@@ -18,6 +19,7 @@ def fly(state: controller.ControllerState, start: float, seconds: float, **chang
     return start + seconds
 
 
+@pytest.mark.slow
 def test_a_large_tracking_error_is_said_then_the_baseline_is_flown() -> None:
     state = controller.init(AIRCRAFT, ControllerSettings(largest_tracking_error=0.5))
     now = fly(state, 0.0, 4.0)

@@ -66,6 +66,7 @@ def test_what_is_not_worth_it_could_not_have_reached_it() -> None:
         assert [one.factor for one in some] == [found[0].factor, found[1].factor, -np.inf]
 
 
+@pytest.mark.slow
 def test_without_a_fault_factors_are_as_rare_as_markov_says() -> None:
     """10,000 stretches: a factor beyond K comes with a chance of at most 1/K; the score's mean square is 1."""
     root = np.linalg.cholesky(P)

@@ -38,6 +38,7 @@ def running(tmp_path: Path) -> Iterator[tuple[subprocess.Popen, str]]:
             process.wait()
 
 
+@pytest.mark.slow
 def test_a_killed_scheduler_is_one_line_and_what_came_back_is_kept(
     running: tuple[subprocess.Popen, str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -61,6 +61,7 @@ def test_workers_are_processes_of_their_own(workers: Workers, tmp_path: Path) ->
     assert os.getpid() not in found
 
 
+@pytest.mark.slow
 def test_a_killed_worker_costs_an_attempt_and_a_slow_flight_is_ended(workers: Workers, tmp_path: Path) -> None:
     found = outcomes(workers, ["once killed", "too slow", "plain"], tmp_path, Limits(4.0, 1))
     assert found["once killed"].result == "ONCE KILLED"

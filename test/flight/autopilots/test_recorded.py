@@ -105,6 +105,7 @@ def with_vanes(logged: list[LoggedSample]) -> list[LoggedSample]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vanes", [True, False])
 def test_a_bag_of_what_the_adapter_said_replays_to_the_same(said, tmp_path, vanes: bool) -> None:
     logged = with_vanes(said) if vanes else said

@@ -29,6 +29,7 @@ def start(aircraft, plain_model) -> CandidateFit:
     return with_candidates(unfitted([plain_model, plain_model], nuisances), [loss], nuisances, [0.2, 8.0])
 
 
+@pytest.mark.slow
 def test_a_fit_without_candidates_starts_at_neutral(aircraft, plain_model) -> None:
     fit = unfitted([plain_model], nuisances_of(aircraft, plain_model))
     np.testing.assert_array_equal(fit.flights[0].point, plain_model.simulator.neutral())

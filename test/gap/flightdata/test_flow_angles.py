@@ -47,6 +47,7 @@ def test_one_vane_is_used_where_it_is_there(aircraft, plain) -> None:
     np.testing.assert_array_equal(flight.record["alpha"], plain.record["alpha"])
 
 
+@pytest.mark.slow
 def test_what_was_not_measured_is_not_compared(vaneless_model) -> None:
     assert {c for c, measured in zip(CHANNELS, vaneless_model.axes, strict=True) if not measured} == {"alpha", "beta"}
     effects = {c.effect for c in candidates_of(vaneless_model.simulator, [vaneless_model])}
@@ -65,6 +66,7 @@ def test_still_air_is_known_to_be_still(vaneless_model) -> None:
     assert vaneless_model.gusts < 0.01 * vaneless_model.record["V"].mean()
 
 
+@pytest.mark.slow
 def test_a_late_imu_cannot_be_told_from_late_commands_without_vanes(aircraft, make_flight) -> None:
     """Nobody metered the thrust either, so that forward motion is left out."""
     flights = [
@@ -81,6 +83,7 @@ def test_a_late_imu_cannot_be_told_from_late_commands_without_vanes(aircraft, ma
     assert "Thrust was not recorded" in paragraph(found)
 
 
+@pytest.mark.slow
 def test_tolerances_are_no_gap_without_vanes(aircraft, make_flight) -> None:
     """A lift slope that is off makes the mean angle of attack wrong, and with it the drag."""
     wrong = {"Cm_alpha": 0.015, "Cm_de": 0.04, "CL_alpha": -0.2, "CL_0": 0.02, "Cl_p": 0.03, "Cn_beta": 0.006}
@@ -106,6 +109,7 @@ def test_readings_before_the_flight_are_said(aircraft, plain) -> None:
         blind(aircraft, flight, "alpha", "beta")
 
 
+@pytest.mark.slow
 def test_the_floor_without_vanes_knows_of_gusts(aircraft, make_flight) -> None:
     """What no vane shows is no error of the simulator; in still air there is nothing that it could not see."""
     floors = []

@@ -58,6 +58,7 @@ def at_analysis_rate(series: Array, samples: int) -> Array:
     return series[:: round(RATE / ANALYSIS)][:samples]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effect",
     [{"imu_bias": {"q": 0.04}}, {"imu_bias": {"p": 0.03}}, {"airspeed_scale": {"error": 0.15}},
@@ -81,6 +82,7 @@ def test_with_the_instruments_as_the_file_has_them_the_angles_are_the_filters(ai
         assert rms(angle - at_analysis_rate(flight.record[name], len(angle))) < 0.002
 
 
+@pytest.mark.slow
 def test_an_angle_that_a_vane_measures_stays(aircraft, plain) -> None:
     flight = blind(aircraft, plain, "beta")
     with_vanes, without = (model_of(aircraft, f) for f in (plain, flight))
@@ -107,6 +109,7 @@ def test_the_part_of_a_flight_begins_with_what_the_filter_knew_there(aircraft) -
         assert rms(angle - at_analysis_rate(cut.record[name], len(angle))) < 0.002
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turbulence", ["none", "light"])
 def test_drag_is_not_compared_in_gusts_that_no_vane_measures(aircraft, make_flight, turbulence) -> None:
     seen = make_flight({}, seed=3, turbulence=turbulence)

@@ -33,6 +33,7 @@ def test_thrust_is_what_the_files_drag_leaves(aircraft, plain) -> None:
     assert (found - true).std() < 0.5 * true.std()
 
 
+@pytest.mark.slow
 def test_forward_motion_is_not_compared(aircraft, plain) -> None:
     model = residual_model_of(Simulator(aircraft, 50.0), without_thrust(aircraft, plain))
     assert {c for c, measured in zip(CHANNELS, model.axes, strict=True) if not measured} == {"CD"}

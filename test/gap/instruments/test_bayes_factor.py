@@ -28,6 +28,7 @@ def tried(aircraft, make_flight):
     return fits
 
 
+@pytest.mark.slow
 def test_what_was_not_flown_does_not_show_in_what_was_commanded(tried) -> None:
     """Other moments of inertia answer to gusts otherwise, and gusts there are."""
     base, trial = tried({}, "inertia_error")

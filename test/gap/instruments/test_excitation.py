@@ -41,6 +41,7 @@ def test_steps_are_deliberate_though_the_autopilot_flies_too(seen) -> None:
     assert externally_excited(model) and external_excitation(model).steps.shape[1] >= 3
 
 
+@pytest.mark.slow
 def test_a_multisine_is_no_answer_to_gusts(seen) -> None:
     model = seen(MULTISINE)
     assert not driven_by_gusts(model) and external_excitation(model).all.shape[1] >= 3

@@ -79,6 +79,7 @@ def test_a_flight_on_which_no_numbers_come_of_the_fit_is_left_out(plain_model: R
     np.testing.assert_allclose(again.share, alone.share)
 
 
+@pytest.mark.slow
 def test_gusts_that_pass_for_derivatives_make_no_structure_of_sharp_steps() -> None:
     """Rolling gusts and short doublets, nothing else: least squares takes half of the roll's derivatives away, and what
     it then leaves of the doublets stands out of a noise that it has made too low."""

@@ -99,6 +99,7 @@ def test_moment_with_the_rate_of_alpha_is_found_despite_the_vane_noise(aircraft)
     assert found.values[1] == pytest.approx(-10.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_lag_is_found_despite_the_vanes_noise(aircraft) -> None:
     """Most of the flight is quiet: by the vanes alone derivatives seem smaller there, and the lag makes up for it."""
     flight = fly(aircraft, {"actuator_lag": {"time_constant": 0.09}}, 3, manoeuvre=STEPS_ONCE, duration=60.0)

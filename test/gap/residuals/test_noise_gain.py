@@ -37,6 +37,7 @@ def noise_at(model: ResidualModel, theta: np.ndarray, record: FlightRecord) -> n
     return (np.abs(noisy.residual(theta) - model.residual(theta)) ** 2).mean(axis=0)
 
 
+@pytest.mark.slow
 def test_smaller_derivatives_leave_less_noise_as_other_realisations_show(gusty) -> None:
     """The vanes' noise is in Cm and CL times their slopes; eight other realisations of it.
 

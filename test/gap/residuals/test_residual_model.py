@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import jax
 import numpy as np
+import pytest
 
 from sysid_node.gap.residuals.predictions import all_channels, kinematic_parameters
 
@@ -35,6 +36,7 @@ def test_kinematics_depend_on_no_other_entries_than_those_named(plain_model) -> 
     )
 
 
+@pytest.mark.slow
 def test_slopes_of_all_parameters_are_those_of_the_whole_prediction(plain_model) -> None:
     """The flow is held for what does not move it, and slopes come in batches; truth: JAX, of everything at once."""
     simulator = plain_model.simulator

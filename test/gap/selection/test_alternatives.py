@@ -39,6 +39,7 @@ def test_the_true_effect_stays(late, alone) -> None:
     assert chosen is alone["command_delay"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", ["command_delay", "imu_scale"])
 def test_of_two_effects_that_were_flown_neither_takes_the_others_place(late_and_scaled, first) -> None:
     fitter, base, candidates = late_and_scaled
@@ -58,6 +59,7 @@ def test_servos_of_second_order_are_told_from_a_lag_and_from_a_delay(oscillating
     assert chosen.fit.values == pytest.approx([0.06, 0.7], rel=0.05)
 
 
+@pytest.mark.slow
 def test_wrong_derivatives_are_compared_with_every_effect_that_was_fitted_alone(mistaken) -> None:
     """Another cause is compared with the likeliest of them only, and with what delays the response as it does."""
     fitter, base, candidates = mistaken

@@ -19,6 +19,7 @@ def selected(late):
     return select_causes(fitter, base, lag, [[lag]], [candidates["command_delay"]])
 
 
+@pytest.mark.slow
 def test_the_true_effect_is_the_cause(selected, late) -> None:
     chosen, (cause,), rejected = selected
     assert chosen.fit.effects == {"command_delay"} == {cause.candidate.effect}
@@ -57,6 +58,7 @@ def test_a_flexible_effect_is_not_more_probable_because_what_it_imitates_was_rej
     assert chosen.fit.effects == {each.candidate.effect for each in causes} == kept
 
 
+@pytest.mark.slow
 def test_what_is_there_besides_is_no_imitation(mistaken) -> None:
     """Truth: late commands, and a centre of gravity that is off. Together they predict best."""
     fitter, base, candidates = mistaken

@@ -20,6 +20,7 @@ def weak_and_slow(aircraft):
     return attribute([model], nuisances_of(aircraft, model), lambda s, t: None)
 
 
+@pytest.mark.slow
 def test_both_of_two_effects_are_named_with_their_sizes(weak_and_slow) -> None:
     fit = weak_and_slow.chosen.fit
     assert fit.effects == {"motor_lag", "thrust_scale"}
@@ -34,6 +35,7 @@ def test_what_adds_up_is_no_alternative(weak_and_slow) -> None:
     assert all(cause.share > 0.9 for cause in weak_and_slow.causes)
 
 
+@pytest.mark.slow
 def test_an_explanation_is_judged_by_what_it_adds_to_the_best_whichever_was_added_first(oscillating) -> None:
     """Truth: servos of second order, for which a delay stood so far. Beside them hardly any delay is left."""
     fitter, base, candidates = oscillating

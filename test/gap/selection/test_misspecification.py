@@ -33,6 +33,7 @@ def evidence_for_gyro_scale(aircraft):
     return of
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turbulence", ["none", "light"])
 def test_a_gyro_that_reads_low_is_one(evidence_for_gyro_scale, make_flight, turbulence) -> None:
     evidence = evidence_for_gyro_scale(make_flight({"imu_scale": {"p": -0.2}}, seed=5, turbulence=turbulence))
@@ -40,6 +41,7 @@ def test_a_gyro_that_reads_low_is_one(evidence_for_gyro_scale, make_flight, turb
     assert calibrated_probability(evidence) > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turbulence", ["none", "light"])
 def test_a_gyro_that_saturates_is_not_one_that_reads_low(evidence_for_gyro_scale, make_flight, turbulence) -> None:
     flight = make_flight({}, seed=5, turbulence=turbulence)

@@ -48,6 +48,7 @@ def test_what_was_lost_before_the_surface_moved_was_lost_before_the_flight(aircr
     assert found.values[loss] == pytest.approx(0.5, abs=0.02)
 
 
+@pytest.mark.slow
 def test_an_onset_in_gusts_is_as_far_off_as_its_standard_error_says(aircraft) -> None:
     """The squares of three errors have a chi-square distribution, 1 % of it beyond 11.3.
 

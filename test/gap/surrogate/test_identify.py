@@ -43,6 +43,7 @@ def surrogate(file: Aircraft, simulated: list) -> Surrogate:
     return identify_simulator(file, simulated, [], lambda share, text: None)
 
 
+@pytest.mark.slow
 def test_the_servos_are_found(surrogate: Surrogate) -> None:
     lag = surrogate.aircraft.effects["actuator_lag"]
     assert surrogate.effects == ("actuator_lag",)

@@ -10,6 +10,7 @@ from sysid_node.gap.validation.simulation_error import simulation_gap
 from sysid_node.sim import Simulator
 
 
+@pytest.mark.slow
 def test_the_gap_that_is_stated_is_that_of_the_corrected_file(servos_fitted) -> None:
     """The flight's servo is off the file's within its tolerance: the corrected file still is, and the gap says so."""
     check, (model,) = servos_fitted.check, servos_fitted.models

@@ -120,6 +120,7 @@ def test_sizes_without_which_other_flight_is_predicted_worse_stay(held: float | 
     assert found is explanation and checked.size == pytest.approx(9.0)
 
 
+@pytest.mark.slow
 def test_sizes_that_no_flight_shows_are_those_of_the_file(aircraft) -> None:
     """The probe reads yaw and roll too; its bias of alpha alone is off in both flights."""
     biased = {"vane_bias": {"alpha": 0.05}}

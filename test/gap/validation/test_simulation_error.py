@@ -74,6 +74,7 @@ def test_weather_is_foreseen_and_effects_are_not(aircraft, make_flight) -> None:
     assert not weather_suffices([residual_model_of(simulator, slow)])
 
 
+@pytest.mark.slow
 def test_a_flight_in_gusts_does_not_hide_what_a_calm_one_shows(aircraft, make_flight) -> None:
     """Servos of 30 ms in severe turbulence and in still air: weather covers them in the first flight only."""
     simulator, slow = Simulator(aircraft, 50.0), {"actuator_lag": {"time_constant": 0.03}}

@@ -30,6 +30,7 @@ def test_of_the_right_model_they_are_those_of_noise(plain_model) -> None:
     assert ratio(plain_model, "derivative_error.Cl_da") < 1.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turbulence", ["none", "light"])
 def test_what_changes_in_flight_is_less_certain(aircraft, make_flight, turbulence) -> None:
     effects = {"control_effectiveness_loss": {"aileron": 0.5, "onset": 13.0}}

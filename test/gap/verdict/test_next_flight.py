@@ -25,6 +25,7 @@ def fits(aircraft) -> dict[str, CandidateFit]:
     return {n: linearised(with_candidates(base, [table[n]], nuisances, [size])) for n, size in sizes.items()}
 
 
+@pytest.mark.slow
 def test_what_is_the_same_thing_is_not_parted(fits) -> None:
     chosen = fits["command_delay"]
     best = propose(chosen, [(chosen.candidates[0], fits["actuator_stamp_delay"])])

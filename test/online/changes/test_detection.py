@@ -53,6 +53,7 @@ def with_half_the_elevator(gusts: float, closed_loop: bool) -> tuple[Array, Arra
     return fly(AIRCRAFT, commands, RATE, 3, seed=3, gusts=gusts, closed_loop=closed_loop, after=after)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("gusts", "closed_loop", "method"),
     [
@@ -72,6 +73,7 @@ def test_half_the_elevator_is_lost(gusts: float, closed_loop: bool, method: str)
         assert later.value == pytest.approx(0.5 * TRUTH["Cm_de"], rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gusts", "method"), [(1.5, "iv_rft"), (0.7, "sls_rft")])
 def test_servos_of_unknown_time_do_not_hide_that_half_the_elevator_is_lost(gusts: float, method: str) -> None:
     """The servos' estimated times move with most renewals: announced by 34 s in every flight all the same."""
@@ -134,6 +136,7 @@ def test_estimates_are_tested_with_the_servos_with_which_they_were_made() -> Non
     np.testing.assert_array_equal(statistics(state), before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changed", "key"),
     [
@@ -167,6 +170,7 @@ def test_estimates_of_quiet_flight_are_learned_anew_without_a_change_being_annou
         assert history[-1].derivatives["Cm_de"].value == pytest.approx(TRUTH["Cm_de"], rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_a_change_leaves_behind_is_forgotten() -> None:
     """Ten seconds later nothing of the old aircraft is in the estimates; without detection it still is."""
     after = (LOST_AT, dict.fromkeys(ELEVATOR, 0.5))
@@ -190,6 +194,7 @@ def test_a_memory_that_fades_forgets_a_change_as_well() -> None:
     assert run(AIRCRAFT, fading, time, flights[0], time[-1:])[0].fits["Cm"].r_squared > 0.97
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gusts", [0.0, 1.5])
 def test_no_change_is_announced_in_unchanged_flight(gusts: float) -> None:
     """A flight of a minute by each method, autopilot in the loop; the bench over hours stands apart."""

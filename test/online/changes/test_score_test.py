@@ -205,6 +205,7 @@ def looked(state: EstimatorState, span: int) -> ScoreTest:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_nothing_is_unlikely_where_nothing_has_changed(method: str) -> None:
     """Gusts of 0.7 m/s, autopilot: of 60 chances no more than a fifth are under a tenth, none under 1e-4."""

@@ -66,6 +66,7 @@ def test_a_wrong_area_moves_all_derivatives_together() -> None:
     assert systematic[i, j] == pytest.approx(-np.sqrt(systematic[i, i] * systematic[j, j]), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_correlations_are_those_of_many_flights() -> None:
     """Monte Carlo, 24 flights: of white noise on one force the estimates scatter together as stated."""
     aircraft, rng = made_aircraft(), np.random.default_rng(11)

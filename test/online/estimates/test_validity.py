@@ -5,6 +5,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 from plant import TRUTH, fly, made_aircraft, multisteps
 
 from bench.estimation.all_imperfections import RATE as SIMULATED_RATE
@@ -88,6 +89,7 @@ def test_answers_to_gusts_that_vanes_measure_do_no_harm() -> None:
     assert all(found[name].valid for name in ("CL_alpha", "Cm_alpha", "Cm_de"))
 
 
+@pytest.mark.slow
 def test_slopes_that_a_poorly_known_servo_changes_by_much_are_not_valid() -> None:
     """A minute in moderate turbulence; the file is silent on servos of 90 ms, and on all else that is a little off.
 
@@ -109,6 +111,7 @@ def test_slopes_that_a_poorly_known_servo_changes_by_much_are_not_valid() -> Non
         assert abs(found.value - sortie.derivatives[name]) < 3.0 * found.standard_error, name
 
 
+@pytest.mark.slow
 def test_nothing_of_an_axis_is_valid_whose_motion_would_amplify_itself() -> None:
     """Truth: measured positions, taken for commands of a servo of 0.2 s: the roll comes before its cause.
 

@@ -29,6 +29,7 @@ def test_sensor_noise_alone_is_no_reason_for_doubt() -> None:
     np.testing.assert_allclose(inflation(spread(EXCESS_RATIO * noise, 1e4), noise), 1.0)
 
 
+@pytest.mark.slow
 def test_gusts_correlated_as_much_as_allowed_are_covered_whatever_the_length() -> None:
     """Slope of y = u + n where n is correlated with u by ALLOWED: 95 % intervals of 4000 records, short and long."""
     rng = np.random.default_rng(1)

@@ -1,6 +1,7 @@
 """Instruments: the frequency response of the file's model, against formulas by hand and simulated flight."""
 
 import numpy as np
+import pytest
 from plant import TRUTH, fly, made_aircraft, multisteps
 
 from sysid_node.online.frequency import fourier_transform, regression_signals
@@ -72,6 +73,7 @@ def test_they_follow_the_motion_of_a_flight() -> None:
         assert flown @ made / np.linalg.norm(flown) / np.linalg.norm(made) > 0.85, name
 
 
+@pytest.mark.slow
 def test_the_file_need_not_be_right() -> None:
     """Instruments from derivatives that are 30 % off: the estimates are those of the flight."""
     wrong = made_aircraft({name: 1.3 * value for name, value in TRUTH.items()})

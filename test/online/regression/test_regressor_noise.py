@@ -69,6 +69,7 @@ def noisy_flights() -> tuple[Array, Array]:
     return fly(NOISY, multisteps(30.0, 100.0, amplitude=0.05), flights=8, seed=1, gusts=0.7)
 
 
+@pytest.mark.slow
 def test_noise_that_the_file_does_not_know_attenuates(noisy_flights: tuple[Array, Array]) -> None:
     """Errors in variables, Klein & Morelli (2006), sec. 5.3: what the compensation is there for."""
     time, flights = noisy_flights
@@ -78,6 +79,7 @@ def test_noise_that_the_file_does_not_know_attenuates(noisy_flights: tuple[Array
     assert (bias < -3.0 * spread).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["sls_rft", "iv_rft"])
 def test_known_noise_does_not_bias(method: str, noisy_flights: tuple[Array, Array]) -> None:
     bias, spread = mean_errors(NOISY, method, *noisy_flights)

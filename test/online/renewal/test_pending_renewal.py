@@ -81,6 +81,7 @@ def test_estimates_hold_every_sample_while_a_segment_is_being_finished(flown) ->
     assert ends and largest < 0.2
 
 
+@pytest.mark.slow
 def test_the_impulse_at_the_start_is_of_the_segment_under_way() -> None:
     """Segments end here, and one begins later than it did, as the elevator is found to have lost half its effect."""
     aircraft, settings = load_aircraft("cdrw"), OnlineSettings()

@@ -31,6 +31,7 @@ LAGS, DAMPING, DELAY = {"elevator": 0.049, "aileron": 0.057, "rudder": 0.069}, 0
 BAGS = Path(__file__).resolve().parents[3] / "bags"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("bag", "control"), [("cdfp_multistep", "aileron"), ("cdrw_random", "elevator")])
 def test_a_servo_and_a_mode_of_the_aircraft_do_not_exchange_their_times(bag: str, control: str):
     """Gauss-Newton steps alone end where the control is 70 to 100 ms late, and its derivatives are far off."""
@@ -48,6 +49,7 @@ def test_a_servo_and_a_mode_of_the_aircraft_do_not_exchange_their_times(bag: str
         assert estimate.standard_error < 0.2 * abs(truth[name])
 
 
+@pytest.mark.slow
 def test_deflections_that_may_be_positions_or_commands_are_no_late_commands() -> None:
     """Steps alone end where the elevator is 55 +- 6 ms late, and its moment and the damping have the other sign."""
     aircraft, seed = load_aircraft("kestrel"), 4
@@ -60,6 +62,7 @@ def test_deflections_that_may_be_positions_or_commands_are_no_late_commands() ->
         assert estimate.lower < aircraft.derivatives[name].value < estimate.upper
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [30, 47])
 def test_a_servo_is_not_so_late_that_the_roll_would_amplify_itself(seed: int) -> None:
     """Steps alone end where the aileron is 100 +- 10 ms late; then ``Cl_p`` is 6.5 standard errors off, and positive.
@@ -76,6 +79,7 @@ def test_a_servo_is_not_so_late_that_the_roll_would_amplify_itself(seed: int) ->
         assert found.derivatives[name].lower < truth[name].value < found.derivatives[name].upper
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surfaces", ["commanded", "measured"])
 def test_stated_servos_may_come_after_smooth_messages_or_not(surfaces: str) -> None:
     """Steps alone end where the aileron is 28 ms early, and ``Cl_p`` is four standard errors off."""

@@ -32,6 +32,7 @@ def estimated(actuators: str, commanded: bool) -> Estimates:
     return estimate(state)
 
 
+@pytest.mark.slow
 def test_the_intervals_of_servos_hold_what_holding_the_commands_would_make():
     servos = estimated("auto", commanded=False).servos
     assert set(servos) == set(SURFACES)
@@ -40,6 +41,7 @@ def test_the_intervals_of_servos_hold_what_holding_the_commands_would_make():
         assert row.lower < 0.0 < row.upper, row
 
 
+@pytest.mark.slow
 def test_where_commands_are_stated_nothing_is_added():
     """The flight shows their lateness as well as it did where nothing was stated."""
     servos, unsaid = estimated("commands", commanded=True).servos, estimated("auto", commanded=False).servos
@@ -49,10 +51,12 @@ def test_where_commands_are_stated_nothing_is_added():
         assert np.hypot(row.standard_error, HELD_OR_NOT) == pytest.approx(unsaid[name].standard_error, rel=0.05)
 
 
+@pytest.mark.slow
 def test_measured_positions_have_no_servos_after_them():
     assert estimated("positions", commanded=False).servos == {}
 
 
+@pytest.mark.slow
 def test_derivatives_do_not_depend_on_what_is_added():
     """Their own intervals contain the lateness that the flight shows, whatever it stems from."""
     found = estimated("auto", commanded=False).derivatives

@@ -83,6 +83,7 @@ def test_only_limits_that_are_stated_and_not_exact_count():
     assert RateLimitedMoves.of(replace(aircraft, effects=exact), symbols) is None
 
 
+@pytest.mark.slow
 def test_a_limit_that_is_off_within_its_tolerance_leaves_the_servos_and_derivatives_within_their_intervals():
     """Commands act 40 ms late. The file states a limit of 2 rad/s with 30 %, but the servos turn at 3.2."""
     late, aircraft = 0.04, load_aircraft("cdrw")

@@ -92,6 +92,7 @@ def unchanged() -> EstimatorState:
     return identified(EXACT, flown()[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", CASES)
 def test_sensitivities_are_those_of_the_estimator(key):
     step, (changed, names, share) = 1e-3, CASES[key]

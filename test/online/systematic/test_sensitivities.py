@@ -71,6 +71,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", CASES)
 def test_sensitivities_are_those_of_the_estimator(key):
     step, change = CASES[key]

@@ -40,6 +40,7 @@ def estimated(noise: float, method: str, seed: int) -> Estimates:
     return run(belief, settings, aligned.time, aligned.samples, aligned.time[-1:], commands_from=0)[-1]
 
 
+@pytest.mark.slow
 def test_with_little_noise_servos_and_derivatives_are_those_flown() -> None:
     """Without tolerances in the way of it: the estimates themselves, in shares of the truth."""
     found = estimated(0.1, "iv_rft", 1)
@@ -63,6 +64,7 @@ def test_a_flight_does_not_tell_how_late_the_imu_is() -> None:
     assert math.sqrt(budget.covariance[place, place]) == pytest.approx(believed, rel=0.1)
 
 
+@pytest.mark.slow
 def test_with_the_usual_noise_intervals_hold() -> None:
     """By the default method. Least squares takes the autopilot's answers to the vanes' noise for manoeuvres.
 
@@ -80,6 +82,7 @@ def test_with_the_usual_noise_intervals_hold() -> None:
     assert errors[-1] < 3.5
 
 
+@pytest.mark.slow
 def test_the_form_of_a_response_does_not_tell_late_servos_from_late_stamps() -> None:
     """Servos of second order without a delay, in still air, of which the file says nothing.
 

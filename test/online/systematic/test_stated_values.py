@@ -82,6 +82,7 @@ def held(rows: Rows) -> float:
     return float(np.mean([d.lower <= truth <= d.upper for d, truth in rows]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimated", [found, regressed])
 def test_intervals_hold_with_a_file_that_states_what_is_off_and_not_with_a_silent_one(
     estimated: Callable[[Aircraft], Rows],

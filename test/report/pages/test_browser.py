@@ -1,5 +1,6 @@
 """Pages in a real browser: every plot is drawn, nothing is complained of, and no page is wider than the window."""
 
+import pytest
 import synthetic
 import synthetic_loop
 from fleet_flights import fleet
@@ -12,6 +13,7 @@ from sysid_node.report.pages.closed_loop_page import write_loop
 from sysid_node.report.pages.run_page import write_report
 
 
+@pytest.mark.slow
 def test_plots_are_drawn_without_a_complaint(tmp_path, browse):
     path = tmp_path / "report.html"
     write_report(path, synthetic.run(seconds=20.0))
@@ -21,6 +23,7 @@ def test_plots_are_drawn_without_a_complaint(tmp_path, browse):
     assert page.data_links == page.plots
 
 
+@pytest.mark.slow
 def test_pages_fit_every_width_light_and_dark(tmp_path, fit_everywhere):
     """A run's, a closed loop's and a fleet's page on a phone, a tablet and a screen."""
     run, flown, many = (tmp_path / name for name in ("run", "loop", "fleet"))

@@ -76,6 +76,7 @@ def test_files_count_for_the_nodes_that_they_name(tmp_path: Path, head: str, hit
     assert found == ({"adapt": 0, "a.b": 1} if hit else {})
 
 
+@pytest.mark.slow
 @given(text=st.text(max_size=12) | st.sampled_from(["2026-13-45", "1" * 5000, "[" * 2000, "&a [*a]", "!!set {a}"]))
 def test_whatever_is_given_is_read_or_left_to_ros(text: str) -> None:
     for one in given_values(["--ros-args", "-p", f"adapt:={text}"], "/node"):

@@ -51,6 +51,7 @@ def share(theirs, ours):
     return np.abs(theirs - ours).max(axis=0) / np.ptp(ours, axis=0)
 
 
+@pytest.mark.slow
 def test_short_flights_are_those_of_our_simulator(flown):
     """Rates, velocity, attitude and specific force within 2 % of their ranges; with 8 times the frames, within 1 %.
 

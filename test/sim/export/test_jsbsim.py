@@ -53,6 +53,7 @@ TABLES = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_jsbsim_flies_as_we_do(tmp_path, case):
     """10 s of 3-2-1-1 from trim: rates and flow angles within 0.5 % of their range."""

@@ -135,6 +135,7 @@ def test_an_effect_does_nothing_while_its_switches_are_neutral(simulator, flown,
     np.testing.assert_allclose(changed.outputs, flight.outputs, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_slopes_agree_with_finite_differences(simulator, flown):
     """At a point where every effect acts, so that no derivative is zero because its switch is neutral."""
     trim, inputs, _ = flown

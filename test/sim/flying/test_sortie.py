@@ -203,6 +203,7 @@ def test_bad_recorders():
         FlightSampler(surfaces="guessed")
 
 
+@pytest.mark.slow
 def test_recording_takes_little_memory_beside_the_flight(fast):
     """Truth: at 10 Hz there is little to record, and the flight itself is the measure."""
     sortie = fly_sortie(fast, np.zeros((round(60.0 * RATE) + 1, 4)), SortieConditions(seed=4))

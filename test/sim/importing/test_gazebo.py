@@ -231,6 +231,7 @@ def theirs(path, x, aircraft):
     return np.array(result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["small", "px4_advanced_plane", "px4_rc_cessna"])
 def test_loads_are_those_of_the_plugins_at_the_tables_points(tmp_path, name):
     path = small(tmp_path) if name == "small" else SHARED / f"{name}.sdf"

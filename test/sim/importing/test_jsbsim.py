@@ -21,6 +21,7 @@ from sysid_node.sim.importing.jsbsim.surfaces import COMMANDS, properties_at
 from sysid_node.sim.importing.jsbsim.survey import survey_model
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_found_by_finite_differences(cessna):
     """At 52 m/s, found before by differences of JSBSim's own coefficient properties."""
     known = {"CL_alpha": 5.33, "Cm_alpha": -1.95, "Cm_q": -12.5, "Cm_de": -1.36, "Cn_beta": 0.060, "Cl_p": -0.488}
@@ -78,6 +79,7 @@ SERVO = """<actuator name="{0} Servo"><input>fcs/{0}-cmd-norm</input><lag>20</la
 <pure_gain name="{0} Scale"><input>fcs/{0}-servo</input><gain>0.4</gain><output>{4}</output></pure_gain>"""
 
 
+@pytest.mark.slow
 def test_servos_are_read_out_of_the_flight_control_system(tmp_path):
     """c172p with an elevator servo: lag 20 1/s, 3 /s, 0.05 s, play 0.05 and offset 0.01 of a command of 0.4 rad."""
     files = find_model("c172p")
@@ -142,12 +144,14 @@ def test_two_commands_move_a_tail_as_in_the_program():
         assert ours[name] == pytest.approx(float(program.fdm[name]), abs=1e-3), name
 
 
+@pytest.mark.slow
 def test_a_jet_and_its_yaw_damper(recwarn):
     found = read_jsbsim("737")
     assert found.aircraft.derivatives["Cm_de"].value == pytest.approx(-1.056, abs=0.001)
     assert any(note.startswith("The rudder's position depends on") for note in found.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "airspeed", "said"),
     [
@@ -189,6 +193,7 @@ def test_a_model_without_mass_or_size_is_one_line(tmp_path, airspeed, was, is_no
         read_jsbsim(str(tmp_path / "c172p.xml"), airspeed)
 
 
+@pytest.mark.slow
 def test_a_property_that_is_not_there_is_one_line_and_no_abort(tmp_path):
     """JSBSim throws when it runs, and again when the model is destroyed, at the end of the process."""
     text = find_model("c172p").main.read_text()

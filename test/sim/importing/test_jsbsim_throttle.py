@@ -19,6 +19,7 @@ def model(request):
     return request.getfixturevalue("cessna") if request.param == "c172p" else read_model("T37", 77.0, 900.0)
 
 
+@pytest.mark.slow
 def test_forces_follow_the_throttle_and_the_airspeed_as_in_jsbsim(model, tmp_path):
     """Force along x at throttles between the tables' points: within 2 % of its range; 10 % and more without tables."""
     aircraft, state = model.imported.aircraft, model.steady.state
@@ -58,6 +59,7 @@ def test_thrust_lags_the_throttle_as_the_engine_does(model, tmp_path):
     assert 0.55 < early / late < 0.75
 
 
+@pytest.mark.slow
 def test_an_engine_that_is_later_than_a_file_can_state_is_imported_as_a_file_that_can_be_flown():
     """Camel's answers a step of the throttle 0.9 s late; with the longest delay, its lag is as much longer."""
     imported = read_jsbsim("Camel")

@@ -47,6 +47,7 @@ def from_jsbsim(aircraft, effects, folder):
     return read_jsbsim(str(path), 16.0, 0.0).aircraft
 
 
+@pytest.mark.slow
 def test_jsbsim_holds_every_derivative_servos_and_the_motor(kestrel, tmp_path):
     """Coefficients are linear, so that equal derivatives are equal coefficients in every state."""
     found = from_jsbsim(kestrel, SERVOS, tmp_path)
@@ -72,6 +73,7 @@ def test_jsbsim_holds_tables_over_the_throttle_and_servos_of_second_order(kestre
     assert {n: pytest.approx(v, rel=1e-6) for n, v in SECOND_ORDER.items()} == found.effect_values()
 
 
+@pytest.mark.slow
 def test_jsbsim_keeps_a_motor_that_lags_apart_from_the_surfaces(kestrel, tmp_path):
     """A throttle still on its way while a surface is commanded is not moved by that surface."""
     known = replace(kestrel, tables=(LookupTable("CD", ("throttle",), ((0.0, 0.35, 1.0),), (0.02, 0.0, -0.06)),))

@@ -73,6 +73,7 @@ def test_turbulence_does_no_harm(fast):
     np.testing.assert_allclose(expected, flight.coefficients, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_slopes_agree_with_finite_differences(fast):
     trim = trim_flight(fast)
     inputs = smooth_inputs(fast, trim)

@@ -24,6 +24,7 @@ def spectra(model: Dryden, frequency: np.ndarray) -> np.ndarray:
     return np.column_stack([u, v, w, p, q, r]) * 2 * np.pi / SPEED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("height", [60.0, 1000.0])
 def test_periodogram_is_the_standards_spectrum(height):
     model = Dryden.at(height, SPAN)

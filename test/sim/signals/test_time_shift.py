@@ -34,6 +34,7 @@ def test_shift_near_zero_has_the_cubics_value_and_slope():
     np.testing.assert_allclose(at_zero[0][1], at_zero[1][1], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_soft_corners():
     x = jnp.linspace(-3.0, 3.0, 601)
     assert np.abs(soft_clip(x, 1.0) - jnp.clip(x, -1, 1)).max() < 0.044
