@@ -41,10 +41,14 @@ class Flyer:
             self.probe.spin(0.02)
 
     def begin(self, words: str = "", patience: float = 60.0) -> None:
-        """Ask for the excitation until it begins, with these words: the exciter may not have heard everybody."""
+        """Ask until the excitation begins, and the answer holds the words: at first the exciter may not have heard all.
+
+        One that has begun with another answer is stopped.
+        """
         end = time.monotonic() + patience
         while not (answer := self._ask()).success or words not in answer.message:
             assert time.monotonic() < end, answer.message
+            assert self.probe.ask(Trigger, "exciter/stop").success
 
     def _ask(self) -> Any:
         """The exciter's answer to one request."""
