@@ -81,6 +81,7 @@ def test_a_replay_finds_the_truth_and_prints_it(replayed):
     assert "<table>" in replayed._repr_html_()
 
 
+@pytest.mark.slow
 def test_a_figure_shows_the_estimates_as_the_report_does(replayed):
     """One panel a derivative, whose last line is the estimate against time."""
     figure = replayed.plot()

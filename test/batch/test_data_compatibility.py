@@ -40,6 +40,7 @@ def test_errors_are_found_within_their_intervals(found):
         assert name in found.remarks[0]
 
 
+@pytest.mark.slow
 def test_corrected_flights_are_nearer_to_the_truth(found, spoilt):
     (better,), true = found.corrected, clean()
     for name in ("q", "az", "alpha", "beta", "ax"):

@@ -32,6 +32,7 @@ def test_every_method_finds_the_truth(found):
     assert np.abs(scores(found.fit.estimates)).max() < 5.0
 
 
+@pytest.mark.slow
 def test_every_method_answers_a_held_out_flight(found):
     ((name, outputs),) = found.holdout.items()
     assert name == "kestrel -1 #2"

@@ -37,7 +37,8 @@ SLOW = (
     *("README.md", "docs/python_api.md", "docs/explanation/faults.md", "docs/start/own_aircraft.md"),
     *("docs/start/slow_servos.md", "docs/how-to/aircraft_file.md", "docs/how-to/batch.md", "docs/how-to/manoeuvre.md"),
     *("docs/how-to/import_model.md", "docs/how-to/new_estimator.md", "docs/how-to/own_simulator.md"),
-    *("docs/how-to/record_and_replay.md",),
+    *("docs/how-to/record_and_replay.md", "docs/how-to/correct_simulator.md", "docs/how-to/view.md"),
+    "docs/start/first_flight.md",
 )
 
 
@@ -120,6 +121,7 @@ def test_what_the_page_shows_can_be_done(
     desk.work_through(page)
 
 
+@pytest.mark.slow
 def test_the_five_lines_of_the_python_interface_run(short_desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first block of docs/python_api.md, as it stands there."""
     page = ROOT / "docs" / "python_api.md"

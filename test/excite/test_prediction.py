@@ -78,6 +78,7 @@ def test_monte_carlo_scatter_is_what_was_predicted(predictor, prediction):
     assert np.all(np.abs(ratio - 1) < 4 * 0.13)
 
 
+@pytest.mark.slow
 def test_slopes_agree_with_differences(predictor, prediction):
     _, commands = outputs_and_commands(prediction)
     slopes = np.asarray(slopes_of(*fly(predictor, commands, np.zeros(35))))

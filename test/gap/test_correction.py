@@ -19,6 +19,7 @@ def test_causes_are_among_the_effects_of_the_corrected_file(lagging) -> None:
     assert lag["elevator"].tolerance == cause["parameters"]["elevator"][1]
 
 
+@pytest.mark.slow
 def test_the_corrected_file_can_be_read_and_is_the_corrected_simulator(lagging) -> None:
     corrected = corrected_aircraft(lagging)
     again = Simulator(parse_aircraft(dump_aircraft(corrected)), 50.0)

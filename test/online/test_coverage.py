@@ -111,6 +111,7 @@ def test_what_is_not_valid_does_not_count():
     assert verdict.far == 0
 
 
+@pytest.mark.slow
 def test_air_data_come_at_their_own_rate_and_are_interpolated():
     batch = fly("cdrw", Setting("test", "none", seconds=15.0), FLIGHTS)  # as above: compiled once
     alpha = batch.samples[..., SAMPLE_COLUMNS.index("alpha")]

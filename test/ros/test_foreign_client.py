@@ -221,6 +221,7 @@ def test_excitation_is_bounded_and_leaves_nothing_behind(client: Client) -> None
     client.until(lambda: "excitation not finite, dropped" in client.said(CONTROLLER))
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     values=st.tuples(*[ANY] * 9),
@@ -309,6 +310,7 @@ def test_a_set_point_in_degrees_is_said(client: Client, vehicles: Vehicles) -> N
     client.until(said)
 
 
+@pytest.mark.slow
 def test_air_data_by_another_clock_are_said(client: Client, vehicles: Vehicles) -> None:
     """They count as not measured, as they must; only that had been said, and not why."""
     words = "/uav1/air_data: stamped 3.6e+03 s before /uav1/imu/data: counts as not measured"

@@ -67,6 +67,7 @@ def flown(aircraft, effects=()):
     return fly_sortie(simulator, moves(simulator), SortieConditions(list(effects), noise=0.0))
 
 
+@pytest.mark.slow
 def test_a_straight_table_is_a_derivative(aircraft):
     """A table that is linear over the flight's range adds its slope to the derivative."""
     alpha, de = np.array([-0.5, 0.0, 0.8]), np.array([-0.5, 0.5])
@@ -80,6 +81,7 @@ def test_a_straight_table_is_a_derivative(aircraft):
     np.testing.assert_allclose(tabled.flight.coefficients, direct.flight.coefficients, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_tables_over_airspeed_and_mach_agree(aircraft):
     sound = float(speed_of_sound(aircraft.reference.air_density, np))
     speeds = np.array([10.0, 18.0, 30.0])
@@ -91,6 +93,7 @@ def test_tables_over_airspeed_and_mach_agree(aircraft):
     assert sound == pytest.approx(340.3, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_table_over_the_throttle_has_the_motors_lag(aircraft):
     """By NumPy's interpolation at the motor's thrust, not at the commanded one; the side force has no other part."""
     table = LookupTable("CY", ("throttle",), ((0.0, 0.1, 1.0),), (-0.01, 0.0, 0.05))

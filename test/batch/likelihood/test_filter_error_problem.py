@@ -29,6 +29,7 @@ def test_sensor_noise_starts_at_its_level_where_nothing_moves():
     np.testing.assert_allclose(np.exp(still.start()[-3:]), NOISE, rtol=0.1)
 
 
+@pytest.mark.slow
 def test_sensitivities_are_the_derivatives_of_the_predictions(problem):
     z = problem.start()
     (block,) = problem.sensitivities(z)

@@ -5,6 +5,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from gusty_models import GUSTS, OBSERVATION, gain, in_gusts
 from made_models import NOISE, SHORT_PERIOD, short_period_model
 from scipy.linalg import solve_discrete_are
@@ -25,6 +26,7 @@ def test_the_steady_covariance_solves_the_riccati_equation():
     )
 
 
+@pytest.mark.slow
 def test_predictions_are_those_of_a_kalman_filter_written_out():
     model, manoeuvre = short_period_model(), in_gusts(np.random.default_rng(5), 5.0)
     q, r, theta = GUSTS**2, NOISE**2, model.start

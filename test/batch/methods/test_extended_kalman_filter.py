@@ -7,6 +7,7 @@ from reference_flights import HFB_EKF
 from sysid_node.batch.methods.extended_kalman_filter import extended_kalman_filter
 
 
+@pytest.mark.slow
 def test_it_gives_the_published_figures(flights):
     case, noise = published_case(flights)
     final = extended_kalman_filter(case.model, [case.manoeuvre], noise).final

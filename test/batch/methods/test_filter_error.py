@@ -55,6 +55,7 @@ def test_intervals_hold_the_truth_in_gusts(in_six_flights):
     assert np.mean(inside) > 0.83  # 30 trials: one standard deviation is 4 %
 
 
+@pytest.mark.slow
 def test_gusts_make_it_better_than_output_error(in_six_flights):
     worse = []
     for manoeuvre, fit in in_six_flights:

@@ -48,6 +48,7 @@ def test_a_wrong_aircraft_file_is_put_right(method):
     assert track.final["Cm_q"].value == found.fit.values["Cm_q"]
 
 
+@pytest.mark.slow
 def test_what_the_flight_does_not_excite_is_not_valid():
     still = clean()
     quiet = dataclasses.replace(still, columns={**still.columns, "dr": np.zeros(len(still))})

@@ -19,6 +19,7 @@ from sysid_node.sim import Simulator
 SHIFT = {"cg_shift": {"x": UncertainValue(0.02), "y": UncertainValue(-0.005), "z": UncertainValue(0.03)}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effects", [{}, SHIFT])
 def test_it_flies_as_the_simulator_does(effects):
     """Also where the file states that the CG is elsewhere."""

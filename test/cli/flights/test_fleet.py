@@ -89,6 +89,7 @@ def test_a_fleet_gives_the_replays_estimates_with_their_covariance(fleet: Path) 
         assert row["covariance"] == pytest.approx(expected, rel=1e-9, abs=1e-15)
 
 
+@pytest.mark.slow
 def test_tables_are_the_same_as_csv_and_as_parquet(fleet: Path) -> None:
     for name in ("flights", "estimates", "refusals"):
         with (fleet / "out" / f"{name}.csv").open() as file:

@@ -45,6 +45,7 @@ def test_each_log_says_its_day_and_its_aircraft(out: Path) -> None:
     assert "write its date into the catalogue" in refusal["reason"]
 
 
+@pytest.mark.slow
 def test_the_same_flight_gives_the_same_derivatives_from_every_log(out: Path) -> None:
     """The two autopilots' logs hold the same 20 s of the bag, rounded and sampled differently.
 

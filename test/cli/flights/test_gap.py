@@ -104,6 +104,7 @@ def test_a_gyro_that_is_off_is_named_with_its_size(found: Path) -> None:
     assert pitch["after"] < 0.3 * pitch["before"]
 
 
+@pytest.mark.slow
 def test_the_gap_is_that_of_short_flights_with_its_interval(found: Path) -> None:
     gap = json.loads((found / "out" / "gap.json").read_text(encoding="utf-8"))["gap"]
     assert gap["measured_by"] == "short_flights" and gap["window_s"] == 2.0 and gap["held_out"]

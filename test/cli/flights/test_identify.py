@@ -80,6 +80,7 @@ def test_deflections_beyond_the_files_limits_are_warned_of(tmp_path):
             work(flight)
 
 
+@pytest.mark.slow
 def test_the_bundled_flights_truth_is_found(summary):
     truth = json.loads((BAGS / "cdrw_multistep.truth.json").read_text())["derivatives"]
     found = summary["derivatives"]

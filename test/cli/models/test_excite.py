@@ -39,6 +39,7 @@ def test_the_table_is_the_manoeuvre(folder):
     assert np.array_equal(table[:, 1:4], plan.surfaces())
 
 
+@pytest.mark.slow
 def test_the_summary_predicts_every_derivative(folder):
     found = json.loads((folder / "summary.json").read_text())
     assert found["manoeuvre"].startswith("doublet:elevator:amplitude=0.03")

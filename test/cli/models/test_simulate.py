@@ -39,6 +39,7 @@ def fly(tmp_path, name, *options):
     return out
 
 
+@pytest.mark.slow
 def test_a_bag_and_its_truth(tmp_path, capsys):
     options = [*MANOEUVRE, "--turbulence", "light", "--effect", "actuator_lag:time_constant=0.05", "--seed", "7"]
     bag = fly(tmp_path, "flight", *options, "--effect", "derivative_error:Cm_alpha=-0.05")
@@ -74,6 +75,7 @@ def test_commands_and_positions_are_both_recorded(tmp_path, surfaces):
     np.testing.assert_allclose(moved[rising], 0.1 * (1.0 - np.exp(-after[rising] / 0.05)), atol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_truths_command_flies_it_again(tmp_path):
     bag = fly(tmp_path, "one", *MANOEUVRE, "--seed", "3", "--open-loop", "--rate", "100", "--quiet")
     words = json.loads((tmp_path / "one.truth.json").read_text())["command"].split()[1:]
@@ -85,6 +87,7 @@ def test_the_truths_command_flies_it_again(tmp_path):
         np.testing.assert_array_equal(getattr(first, values), getattr(second, values))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effects", "surfaces", "begin", "changes"),
     [
@@ -160,6 +163,7 @@ def test_an_existing_bag_is_kept(tmp_path, capsys):
     assert "exists already" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_bundled_flights_are_what_their_commands_make(tmp_path):
     """One of them, flown again: equal but for what another processor rounds otherwise."""
     name = "cdrw_slow"
@@ -198,6 +202,7 @@ def test_with_and_without_the_autopilot_is_a_contradiction(tmp_path, capsys):
     assert "--autopilot: not allowed with argument --open-loop" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -36,6 +36,7 @@ def test_a_fit_without_candidates_starts_at_neutral(aircraft, plain_model) -> No
     assert fit.values.size == 0 and fit.prior_score == 0.0 and fit.effects == frozenset()
 
 
+@pytest.mark.slow
 def test_new_candidates_start_where_they_are_told(start) -> None:
     np.testing.assert_array_equal(start.values, [0.2, 8.0])
     np.testing.assert_array_equal(start.sizing, [True, False])
@@ -53,6 +54,7 @@ def test_flights_share_derivatives_and_have_biases_of_their_own(start) -> None:
     assert sorted({*first, *second}) == list(range(now.size))
 
 
+@pytest.mark.slow
 def test_information_is_that_of_the_priors_and_of_all_slopes(start) -> None:
     fit = linearised(start)
     slopes = np.concatenate([flight.slopes.reshape(-1, flight.slopes.shape[2]) for flight in fit.flights])

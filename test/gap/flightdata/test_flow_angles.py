@@ -55,6 +55,7 @@ def test_what_was_not_measured_is_not_compared(vaneless_model) -> None:
     assert {"actuator_lag", "command_delay", "cg_shift"} <= effects
 
 
+@pytest.mark.slow
 def test_only_noise_is_left_of_the_same_aircraft(vaneless_model) -> None:
     model = vaneless_model
     residual = np.abs(model.residual(model.simulator.neutral())[:, 1:]) ** 2

@@ -126,6 +126,7 @@ def test_a_signal_that_is_needed_is_named(aircraft, name: str) -> None:
         completed_flight(aircraft, without(flight_with(aircraft), name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("logged", [10, 100])
 def test_a_slow_logs_commands_keep_their_interval_apart_from_the_rate_of_the_lines(aircraft, logged: int) -> None:
     """Truth: the log's own rate. A rate of messages is not that at which steps were logged."""

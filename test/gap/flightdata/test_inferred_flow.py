@@ -75,6 +75,7 @@ def test_an_error_of_an_instrument_is_taken_out_of_the_angles(aircraft, effect) 
     assert max(right) < 0.012 and max(right) < 0.5 * max(wrong), (wrong, right)
 
 
+@pytest.mark.slow
 def test_with_the_instruments_as_the_file_has_them_the_angles_are_the_filters(aircraft, plain) -> None:
     flight = blind(aircraft, plain, "alpha", "beta")
     model = model_of(aircraft, flight)
@@ -100,6 +101,7 @@ def test_the_filter_stands_still_beyond_the_record(aircraft, plain) -> None:
     assert np.asarray(steps.corrects).sum() == pytest.approx(flight.history.corrects.sum(), abs=1)
 
 
+@pytest.mark.slow
 def test_the_part_of_a_flight_begins_with_what_the_filter_knew_there(aircraft) -> None:
     seen = fly(aircraft, {}, manoeuvre=["3211:elevator:start=20:width=0.3"], duration=50.0)
     cut = cut_to_manoeuvre(blind(aircraft, seen, "alpha", "beta"), ("de", "da", "dr"))

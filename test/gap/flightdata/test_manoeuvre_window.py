@@ -29,6 +29,7 @@ def test_a_manoeuvre_at_the_end_keeps_enough_before_it(aircraft) -> None:
     assert abs(cut.record["de"]).max() == abs(flight.record["de"]).max()
 
 
+@pytest.mark.slow
 def test_a_flight_of_the_shortest_length_is_kept(aircraft) -> None:
     flight = fly(aircraft, {}, manoeuvre=["doublet:elevator:start=4:width=0.3"], duration=6.2)
     assert cut_to_manoeuvre(flight, CONTROLS) is flight

@@ -83,6 +83,7 @@ def test_a_file_without_a_pitching_slope_says_nothing_of_the_band() -> None:
     assert highest_frequency(bare, lateral=True) == 4.0
 
 
+@pytest.mark.slow
 def test_the_simulator_is_stable_at_the_lowest_rate(heavy: Aircraft) -> None:
     """Its structural mode is solved exactly, whether an effect excites it or not."""
     simulator = Simulator(heavy, LOWEST_RATE)

@@ -35,6 +35,7 @@ def test_what_was_not_flown_does_not_show_in_what_was_commanded(tried) -> None:
     assert log_bayes_factor(trial.fit, base.fit) < 3.0
 
 
+@pytest.mark.slow
 def test_a_lag_shows_in_what_was_commanded(tried) -> None:
     base, trial = tried({"actuator_lag": {"time_constant": 0.08}}, "actuator_lag")
     assert log_bayes_factor(trial.fit, base.fit) > 20.0

@@ -15,6 +15,7 @@ def lacking(flight, *names: str):
     return replace(flight, record=replace(flight.record, columns=columns))
 
 
+@pytest.mark.slow
 def test_without_attitude_forces_are_compared_and_nothing_else(aircraft, plain) -> None:
     model = residual_model_of(Simulator(aircraft, 50.0), lacking(plain, "phi", "theta", "psi"))
     assert [c for c, measured in zip(CHANNELS, model.axes, strict=True) if measured] == list(CHANNELS[:6])

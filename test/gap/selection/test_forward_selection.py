@@ -30,6 +30,7 @@ def test_both_of_two_effects_are_named_with_their_sizes(weak_and_slow) -> None:
     assert found["thrust_scale.error"] == pytest.approx(-0.4, rel=0.15)
 
 
+@pytest.mark.slow
 def test_what_adds_up_is_no_alternative(weak_and_slow) -> None:
     """Each predicts much better beside the other, so that neither takes the other's probability away."""
     assert all(cause.share > 0.9 for cause in weak_and_slow.causes)

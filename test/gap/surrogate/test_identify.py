@@ -52,6 +52,7 @@ def test_the_servos_are_found(surrogate: Surrogate) -> None:
     )
 
 
+@pytest.mark.slow
 def test_derivatives_are_the_simulators_within_their_tolerances(surrogate: Surrogate, simulator: Aircraft) -> None:
     found = surrogate.aircraft.derivatives
     deviations = [(found[n].value - d.value) / found[n].tolerance for n, d in simulator.derivatives.items()]

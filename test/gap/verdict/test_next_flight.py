@@ -32,6 +32,7 @@ def test_what_is_the_same_thing_is_not_parted(fits) -> None:
     assert best is not None and best.separation < 0.1
 
 
+@pytest.mark.slow
 def test_a_lag_and_a_delay_are_parted_by_some_flight(fits) -> None:
     chosen = fits["command_delay"]
     best = propose(chosen, [(chosen.candidates[0], fits["actuator_lag"])])

@@ -51,6 +51,7 @@ def test_with_little_noise_servos_and_derivatives_are_those_flown() -> None:
         assert found.derivatives[name].value == pytest.approx(truth, rel=0.15), name
 
 
+@pytest.mark.slow
 def test_a_flight_does_not_tell_how_late_the_imu_is() -> None:
     """A late IMU is the same as early air data and faster servos, of which the file says little.
 

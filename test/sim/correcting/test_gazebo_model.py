@@ -61,6 +61,7 @@ def read_again(exported, folder):
     return read_gazebo(folder / "again.sdf", 16.0).aircraft
 
 
+@pytest.mark.slow
 def test_nothing_changed_is_the_same_model(model):
     path, aircraft = model
     exported = corrected_sdf(path, aircraft)

@@ -87,6 +87,7 @@ def changes(exported):
     return {line.partition(":")[0].strip(): float(line.partition(":")[2].split("#")[0]) for line in new}
 
 
+@pytest.mark.slow
 def test_nothing_changed_is_the_same_file(model):
     path, aircraft = model
     assert corrected_parameters(path, aircraft).text == TEXT

@@ -164,6 +164,7 @@ def test_asymmetric_thrust_is_a_rotor_at_another_place(tmp_path):
     assert said(exported, "thrust_yaw:") == "thrust_yaw: of p_factor only the moment at level flight's alpha"
 
 
+@pytest.mark.slow
 def test_what_was_read_from_a_plugin_is_found_again(tmp_path):
     """PX4's plane stalls at 0.339 rad about a place 0.12 m behind the link's origin: the fit finds its numbers."""
     path = SHARED / "px4_advanced_plane.sdf"
@@ -252,6 +253,7 @@ def test_a_joint_of_two_controls_has_one_servo():
     assert limits == pytest.approx([0.6, 0.6])
 
 
+@pytest.mark.slow
 def test_tables_over_two_variables_are_told_with_their_size():
     table = LookupTable("Cm", ("alpha", "de"), ((-0.2, 0.0, 0.3), (-0.35, 0.0, 0.35)),
                         ((0.02, 0.0, -0.02), (0.0, 0.0, 0.0), (-0.03, 0.0, 0.03)))  # fmt: skip

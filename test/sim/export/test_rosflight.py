@@ -102,6 +102,7 @@ def test_servo_tau_is_that_of_elevator_and_aileron(tmp_path):
     assert parameters(none)["servo_tau"] == pytest.approx(0.0015)  # left out, rosflight_sim would take 0.01 s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["aerosonde", "anaconda"])
 def test_what_was_read_from_rosflight_is_found_again(name):
     """Stall (M, alpha0), lift, parasitic drag and derivatives of the file to 1e-6."""

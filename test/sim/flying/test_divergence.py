@@ -22,6 +22,7 @@ def flown(effects: list[str], seconds: float) -> tuple[float, str]:
     return np.inf, ""
 
 
+@pytest.mark.slow
 def test_level_flight_does_not_diverge() -> None:
     assert flown([], 3.0) == (np.inf, "")
 

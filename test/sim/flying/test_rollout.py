@@ -59,6 +59,7 @@ def test_free_fall_is_a_parabola():
     np.testing.assert_allclose(-x[:, 2], -x[0, 2] + climb * time - 0.5 * GRAVITY * time**2, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_runge_kutta_is_of_fourth_order(aircraft):
     trim = trim_flight(Simulator(aircraft, 100.0))
     commands = np.tile(trim.command + np.array([0.03, 0.02, -0.04, 1.0]), (2561, 1))
@@ -160,6 +161,7 @@ def test_slopes_agree_with_finite_differences(simulator, flown):
         assert (error <= 2e-4 * size + 1e-6 * size.max()).all(), f"{name}: {error / (size + 1e-12)}"
 
 
+@pytest.mark.slow
 def test_slopes_at_neutral_are_finite_and_see_every_switch(simulator, flown):
     """All but those of effects that need more than a slope: the rate limit (a corner) and what acts on nothing here."""
     trim, inputs, _ = flown
@@ -177,6 +179,7 @@ def test_slopes_at_neutral_are_finite_and_see_every_switch(simulator, flown):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_rollouts_may_be_batched(simulator, flown):
     trim, inputs, flight = flown
     thetas = np.stack([simulator.neutral(), simulator.vector(["mass_error:error=0.05"])])

@@ -35,6 +35,7 @@ def columns(sortie):
     return dict(zip(sortie.simulator.outputs, np.asarray(sortie.flight.outputs).T, strict=True))
 
 
+@pytest.mark.slow
 def test_the_autopilot_holds_attitude_and_speed(fast):
     """In turbulence the autopilot keeps attitude and airspeed closer to the trim than the aircraft alone does."""
     still = np.zeros((round(30.0 * RATE) + 1, 4))
@@ -49,6 +50,7 @@ def test_the_autopilot_holds_attitude_and_speed(fast):
     assert abs(held["V"][-1000:].mean() - 18.0) < 1.0
 
 
+@pytest.mark.slow
 def test_recorded_commands_fly_the_same_flight_again(sortie):
     """The commands of the autopilot, flown open loop in the same gusts, give the same flight."""
     again = sortie.simulator.rollout(
@@ -134,6 +136,7 @@ def test_stamp_delay_of_the_actuators(fast, moves):
     np.testing.assert_allclose(late.actuators.positions[5:], plain.actuators.positions[:-5], atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effects", "servo"),
     [

@@ -12,6 +12,7 @@ from sysid_node.sim import trim_flight
 from sysid_node.sim.prediction.accelerations import predict_accelerations
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", [None, "actuator_lag", "stall_separation", "structural_mode"])
 def test_effects_without_acting_parameters_may_be_left_out(fast, effect):
     """Truth: the same with every effect evaluated."""

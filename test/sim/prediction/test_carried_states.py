@@ -4,6 +4,7 @@ from functools import partial
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from plain import make_aircraft
 from simulated_signals import signals_from, smooth_inputs
 
@@ -15,6 +16,7 @@ from sysid_node.sim.prediction.true_motion import true_motion
 from sysid_node.sim.signals.low_pass import SPREAD
 
 
+@pytest.mark.slow
 def test_actuators_and_motor_are_those_of_a_rollout(fast):
     """Truth: the true surfaces and thrust of a rollout with lag, backlash, rate limit and motor lag."""
     theta = fast.vector(
@@ -36,6 +38,7 @@ def test_actuators_and_motor_are_those_of_a_rollout(fast):
     np.testing.assert_array_equal(states.separation, 1.0)  # attached where the stall does not act
 
 
+@pytest.mark.slow
 def test_a_rate_limit_sees_commands_before_the_low_pass():
     """Truth: steps of 0.2 rad at 0.4 rad/s by a loop at 2 kHz, then the Gaussian. A smoothed step leads by 24 ms."""
     simulator, fine = Simulator(make_aircraft(), 50.0), 2000

@@ -31,6 +31,7 @@ NOT_SEEN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", [name for name in EFFECTS if name not in NOT_SEEN])
 def test_prediction_expects_what_the_rollout_shows(fast, effect):
     theta = fast.neutral()
