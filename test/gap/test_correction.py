@@ -31,12 +31,14 @@ def test_the_corrected_file_can_be_read_and_is_the_corrected_simulator(lagging) 
     assert corrected.derivatives["Cm_alpha"].value == pytest.approx(expected + error)
 
 
+@pytest.mark.slow
 def test_effects_that_are_no_causes_stay_as_the_file_states_them(servos_fitted) -> None:
     corrected, file = corrected_aircraft(servos_fitted), servos_fitted.aircraft
     assert corrected.effects == file.effects and corrected.delays == file.delays
     assert corrected.derivatives["Cm_alpha"].value == pytest.approx(file.derivatives["Cm_alpha"].value + 0.015)
 
 
+@pytest.mark.slow
 def test_options_of_the_command_are_the_same_effects(lagging) -> None:
     corrected = Simulator(corrected_aircraft(lagging), 50.0)
     by_options = lagging.attribution.corrected.simulator.vector(effect_options(lagging))

@@ -275,6 +275,7 @@ def test_set_points_of_a_best_effort_publisher_are_flown_until_they_expire(clien
     client.until(lambda: abs(client.tracking["roll"]) < 0.01)
 
 
+@pytest.mark.slow
 def test_one_pitch_rate_does_not_move_the_reference_for_ever(client: Client) -> None:
     client.points.publish(client.joints({"pitch_rate": 0.3}))
     client.spin(0.3)

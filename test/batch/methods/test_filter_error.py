@@ -64,6 +64,7 @@ def test_gusts_make_it_better_than_output_error(in_six_flights):
     assert np.median(worse) > 1.5
 
 
+@pytest.mark.slow
 def test_predictions_of_the_fitted_flight_are_the_fits(in_six_flights):
     manoeuvre, fit = in_six_flights[0]
     (response,) = predict_filter_error(short_period_model(), [manoeuvre], fit.values, fit.extras)

@@ -114,11 +114,13 @@ def test_the_gap_is_that_of_short_flights_with_its_interval(found: Path) -> None
     assert gap["forces_and_kinematics"]["window_s"] == pytest.approx(6.0, rel=0.1)  # a third of the flight
 
 
+@pytest.mark.slow
 def test_nothing_unfinished_is_left(found: Path) -> None:
     files = {"gap.json", "where.csv", "candidates.csv", "corrected.yaml", "effects.txt", "flights.csv", "report.html"}
     assert {path.name for path in (found / "out").iterdir()} == files
 
 
+@pytest.mark.slow
 def test_the_corrected_model_can_be_flown(found: Path) -> None:
     effects = (found / "out" / "effects.txt").read_text(encoding="utf-8").split()
     assert effects[0] == "--effect" and effects[1].startswith("imu_bias:")
@@ -127,12 +129,14 @@ def test_the_corrected_model_can_be_flown(found: Path) -> None:
     assert truth["effects"]["imu_bias"]["q"] == pytest.approx(0.03, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_corrected_model_can_be_exported(found: Path) -> None:
     words = ["export", str(found / "out" / "corrected.yaml"), "--format", "jsbsim", "--quiet"]
     assert main([*words, "--out", str(found / "model.xml")]) == 0
     assert "<fdm_config" in (found / "model.xml").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_page_begins_with_words(found: Path) -> None:
     page = (found / "out" / "report.html").read_text(encoding="utf-8")
     assert "restarted every 2 s" in page and "imu bias" in page and "Which effects this flight can distinguish" in page

@@ -55,6 +55,7 @@ def test_the_summary_predicts_every_derivative(folder):
     assert np.allclose(matrix, matrix.T)
 
 
+@pytest.mark.slow
 def test_the_bag_is_the_predicted_flight(folder):
     flight = load_flight_record(folder / "flight", load_aircraft("cdfp"))
     assert flight.duration > 7.5
@@ -71,6 +72,7 @@ class Links(HTMLParser):
         self.found += [value for name, value in attributes if name in ("src", "href") and tag != "a"]
 
 
+@pytest.mark.slow
 def test_the_page_is_whole_and_stands_alone(folder):
     page = (folder / "report.html").read_text()
     links = Links()
@@ -88,6 +90,7 @@ def test_its_page_and_an_aircrafts_fit_every_width_light_and_dark(folder, tmp_pa
     fit_everywhere(folder / "report.html", tmp_path / "aircraft" / "report.html")
 
 
+@pytest.mark.slow
 def test_running_again_replaces(folder):
     assert sysid("--aircraft", "cdfp", "--manoeuvre", SPEC, "--out", folder, "--open-loop", *FAST) == 0
     assert json.loads((folder / "summary.json").read_text())["autopilot"] is False

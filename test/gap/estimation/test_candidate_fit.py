@@ -43,6 +43,7 @@ def test_new_candidates_start_where_they_are_told(start) -> None:
     assert onset_places(start) == [1]
 
 
+@pytest.mark.slow
 def test_flights_share_derivatives_and_have_biases_of_their_own(start) -> None:
     chosen, shared, separate = start.sizes
     now, sigma, _ = start.stacked
@@ -63,11 +64,13 @@ def test_information_is_that_of_the_priors_and_of_all_slopes(start) -> None:
     assert fit.cost == pytest.approx(squares - 2.0 * fit.prior_score)
 
 
+@pytest.mark.slow
 def test_an_onset_has_no_slope(start) -> None:
     fit = linearised(start)
     assert not fit.flights[0].slopes[..., 1].any() and fit.flights[0].slopes[..., 0].any()
 
 
+@pytest.mark.slow
 def test_no_step_leads_beyond_a_limit(start) -> None:
     least, greatest = step_limits(start)
     assert least[1] == greatest[1] == 0.0  # the onset
@@ -79,6 +82,7 @@ def test_no_step_leads_beyond_a_limit(start) -> None:
         np.testing.assert_allclose(np.abs(now), limit)
 
 
+@pytest.mark.slow
 def test_a_step_within_the_limits_is_taken_as_it_is(start) -> None:
     least, greatest = step_limits(start)
     step = 0.3 * np.where(np.random.default_rng(0).random(least.size) < 0.5, least, greatest)

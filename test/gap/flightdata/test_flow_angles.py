@@ -63,6 +63,7 @@ def test_only_noise_is_left_of_the_same_aircraft(vaneless_model) -> None:
     assert (ratio < 8.0).all(), ratio
 
 
+@pytest.mark.slow
 def test_still_air_is_known_to_be_still(vaneless_model) -> None:
     assert vaneless_model.gusts < 0.01 * vaneless_model.record["V"].mean()
 

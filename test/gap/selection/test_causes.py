@@ -45,6 +45,7 @@ def rejected_for_its_equation(fitted):
     return replace(cause, evidence=replace(cause.evidence, misspecification=1.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("supported", "kept"), [(True, set()), (False, {"inertia_error"})])
 def test_a_flexible_effect_is_not_more_probable_because_what_it_imitates_was_rejected(late, supported, kept) -> None:
     """Truth: late commands, which inertias that are off may imitate in a part. What hardly was a cause is none."""

@@ -61,6 +61,7 @@ def test_derivatives_are_the_simulators_within_their_tolerances(surrogate: Surro
     assert [found[n].value for n in main] == pytest.approx([simulator.derivatives[n].value for n in main], rel=0.03)
 
 
+@pytest.mark.slow
 def test_what_is_left_on_flight_held_out_is_small(surrogate: Surrogate) -> None:
     assert 0.0 < surrogate.error.total < 0.08
     assert set(surrogate.error.per_channel) >= {"q", "p", "alpha", "az"}

@@ -40,6 +40,7 @@ def test_a_lag_and_a_delay_are_parted_by_some_flight(fits) -> None:
     assert np.isfinite(best.flown)
 
 
+@pytest.mark.slow
 def test_all_flights_that_were_flown_count(aircraft, fits) -> None:
     """Two flights that are alike tell the square root of two times as much as one."""
     chosen = fits["command_delay"]

@@ -70,6 +70,7 @@ def test_nothing_changed_is_the_same_model(model):
     assert not exported.left_out
 
 
+@pytest.mark.slow
 def test_a_derivative_a_servo_and_the_motor(model, tmp_path):
     """Only their numbers change; the joint's damping of 1 over a lag of 0.1 s is a gain of 10."""
     path, aircraft = model

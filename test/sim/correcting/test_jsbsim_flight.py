@@ -67,6 +67,7 @@ def test_short_flights_are_those_of_our_simulator(flown):
     assert (share(found.force, outputs[:, :3]) < allowed).all()
 
 
+@pytest.mark.slow
 def test_short_flights_begin_in_the_given_state(flown):
     states, _, found, begins, _ = flown
     assert found.velocity[begins] == pytest.approx(states[begins, 3:6], abs=0.02)

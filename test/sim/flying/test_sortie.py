@@ -59,6 +59,7 @@ def test_recorded_commands_fly_the_same_flight_again(sortie):
     np.testing.assert_allclose(again.outputs, sortie.flight.outputs, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_delays_reach_the_autopilots_commands_too(fast, moves):
     sortie = fly_sortie(fast, moves, SortieConditions(["command_delay:delay=0.0625"], seed=4))
     again = fast.rollout(sortie.theta, sortie.trim.initial, sortie.inputs._replace(commands=sortie.flight.commands))
