@@ -4,11 +4,12 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo loop install docs test slow lint format build bench fuzz clean distclean
+.PHONY: help demo loop install docs test testall lint format build bench fuzz clean distclean
 
 VENV ?= .venv
 RATE ?= 1
 BAG  ?= bags/cdrw_multistep
+WHICH := -m "not slow"
 OUT  ?= out/demo
 ARGS ?=
 VIEW ?=
@@ -45,10 +46,10 @@ docs: $(DONE)/run $(DONE)/desk $(DONE)/docs  ## the documentation as a site, out
 	@echo "out/docs/index.html"
 
 test: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev $(DONE)/docs $(DONE)/view  ## run the tests, but for the slow ones; ARGS="test/online -x" runs some
-	@$(BIN)/python -m pytest -n 3 --dist loadfile -m "not slow" $(ARGS)
+	@$(BIN)/python -m pytest -n 3 --dist loadfile $(WHICH) $(ARGS)
 
-slow: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev $(DONE)/docs $(DONE)/view  ## run the slow tests: whole diagnoses, closed loops, Monte Carlo
-	@$(BIN)/python -m pytest -n 3 --dist loadfile -m slow $(ARGS)
+testall: WHICH := -m ""
+testall: test  ## run all tests, the slow ones too: whole diagnoses, closed loops, Monte Carlo
 
 lint: $(DONE)/build $(DONE)/run $(DONE)/desk $(DONE)/logs $(DONE)/fleet $(DONE)/dev  ## ruff and mypy --strict
 	@$(BIN)/ruff check .
