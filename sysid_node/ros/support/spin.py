@@ -77,7 +77,7 @@ def run_program(program: Callable[[], None]) -> int:
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
         rclpy.logging.get_logger("sysid").fatal(f"arguments after --ros-args: {' '.join(str(error).split())}")
         return 2
-    stopper = threading.Thread(target=_shut_down_once, args=(told,))
+    stopper = threading.Thread(target=_shut_down_once, args=(told, rclpy.get_default_context().handle))
     stopper.start()
     try:
         with until_shutdown():
@@ -86,6 +86,8 @@ def run_program(program: Callable[[], None]) -> int:
         rclpy.logging.get_logger("sysid").fatal(str(error))
         return 2
     finally:
+        with _staying_up:
+            rclpy.try_shutdown()
         told.put(None)
         stopper.join()
         for one in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C while Python ends would be its exit code
@@ -93,11 +95,15 @@ def run_program(program: Callable[[], None]) -> int:
     return 0
 
 
-def _shut_down_once(told: SimpleQueue[None]) -> None:
-    """Shut ROS down once the program is told to stop, or is done."""
+def _shut_down_once(told: SimpleQueue[None], handle: Any) -> None:
+    """Shut ROS down once the program is told to stop, as rclpy's own handler of signals does.
+
+    What ``rclpy.shutdown`` does beside that, such as the end of logging, waits until nodes are destroyed.
+    """
     told.get()
-    with _staying_up, until_shutdown():
-        rclpy.try_shutdown()
+    with _staying_up, until_shutdown(), handle:
+        if handle.ok():
+            handle.shutdown()
 
 
 def take_up(executor: Executor, node: Node) -> None:
