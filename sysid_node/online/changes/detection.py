@@ -232,24 +232,26 @@ def _contradicted(tests: ChangeTests, span: int, excited: ExcitedSegments, block
     return bool((found.chance(MARGIN)[tested] < FALSE_ALARM).any())
 
 
-def left_of_earlier_flight(tests: ChangeTests, excited_segments: list[ExcitedSegments], end: float) -> Array:
-    """(2, C) degrees of freedom, and sums of squares that are left, of well-excited flight until ``end`` (s)."""
+def residuals_of_earlier_flight(tests: ChangeTests, excited_segments: list[ExcitedSegments], end: float) -> Array:
+    """(2, C) degrees of freedom and sums of squares of the residuals, of well-excited flight until ``end`` (s)."""
     structure = tests.full.structure
-    left = np.zeros((2, len(structure.coefficients)))
+    residuals = np.zeros((2, len(structure.coefficients)))
     for block, excited in enumerate(excited_segments):
         reference = estimates_of(excited, tests.full, tests.now - tests.memory, end)
         if reference is not None:
             found = np.array([reference.uncertainty.freedom, reference.solution.residual])
-            left[:, structure.block == block] = found[:, structure.block == block]
-    return left
+            residuals[:, structure.block == block] = found[:, structure.block == block]
+    return residuals
 
 
-def fits_worse(left: Array, before: Array, unknowns: int) -> bool:
-    """Whether a model of other ``unknowns`` cannot be that of the earlier flight, by what either leaves of it.
+def fits_worse(residuals: Array, before: Array, unknowns: int) -> bool:
+    """Whether a model with other values of so many ``unknowns`` fits earlier flight worse than chance allows.
+
+    ``residuals`` are those with the other values, ``before`` those with the former ones, both (2, C).
 
     The likelihood ratio of two models whose noise is estimated, too (Davison, "Statistical Models", 2003, sec. 4.5).
     """
-    freedom, squares = left
+    freedom, squares = residuals
     known = (freedom >= KNOWN) & (before[1] > 0.0)
     ratio = float((freedom[known] * np.log(squares[known] / before[1][known])).sum())
     return bool(chdtrc(unknowns, max(ratio / MARGIN, 0.0)) < SIGNIFICANCE)

@@ -26,11 +26,11 @@ def look_for_changes(state: EstimatorState) -> ChangeDecision | None:
     return detection.examine(_change_tests(state), state.changes.excited)
 
 
-def left_of_earlier_flight(state: EstimatorState, finding: ChangeDecision) -> Array | None:
-    """What the model leaves of the flight from before a change of the aircraft; None where no change is found."""
+def residuals_of_earlier_flight(state: EstimatorState, finding: ChangeDecision) -> Array | None:
+    """Residuals of the flight from before a change of the aircraft (2, C); None where no change is found."""
     if not finding.changed or finding.since is None:
         return None
-    return detection.left_of_earlier_flight(_change_tests(state), state.changes.excited, finding.since)
+    return detection.residuals_of_earlier_flight(_change_tests(state), state.changes.excited, finding.since)
 
 
 def respond(state: EstimatorState, lines: Array, finding: ChangeDecision) -> Steps[None]:

@@ -20,7 +20,7 @@ from sysid_node.online.frequency.fourier_transform import impulse
 from sysid_node.online.regression.heteroskedasticity import NoiseMoments
 from sysid_node.online.regression.information import edges, products
 from sysid_node.online.renewal import pending_renewal, servo_search
-from sysid_node.online.renewal.change_response import left_of_earlier_flight, look_for_changes, memory, respond
+from sysid_node.online.renewal.change_response import look_for_changes, memory, residuals_of_earlier_flight, respond
 from sysid_node.online.renewal.segment_information import fading, measure_noise_moments
 from sysid_node.online.renewal.servo_steps import solve_with_servos
 from sysid_node.online.state import EstimatorState, FinishedSums, Steps, completed, current_lines
@@ -63,12 +63,12 @@ def _solved(
     servos: then it was the change that moved them.
     """
     servos = state.controls.servos
-    left = None if finding is None or servos is None else left_of_earlier_flight(state, finding)
+    residuals = None if finding is None or servos is None else residuals_of_earlier_flight(state, finding)
     yield from solve_with_servos(state, lines)
     yield from servo_search.try_another_solution(state)
     if finding is not None and state.controls.servos is not servos:
         yield
-        if left is None or not _contradicts_servos(state, finding, left):
+        if residuals is None or not _contradicts_servos(state, finding, residuals):
             state.changes.monitor = before
             finding = look_for_changes(state)
     if finding is not None:
@@ -78,9 +78,12 @@ def _solved(
 
 
 def _contradicts_servos(state: EstimatorState, finding: ChangeDecision, before: Array) -> bool:
-    """Whether the flight from before the change contradicts the servos as they are now: ``before`` less was left."""
-    left, servos = left_of_earlier_flight(state, finding), state.controls.servos
-    return left is not None and servos is not None and detection.fits_worse(left, before, 3 * servos.lateness.size)
+    """Whether flight from before the change contradicts the servos; ``before``: its residuals with the former ones."""
+    residuals, servos = residuals_of_earlier_flight(state, finding), state.controls.servos
+    if residuals is None or servos is None:
+        return False
+    unknowns = 3 * servos.lateness.size  # lateness, curvature and third coefficient of each
+    return detection.fits_worse(residuals, before, unknowns)
 
 
 def reach(time: Any, step: Any) -> Any:
