@@ -11,6 +11,7 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.stated_effects import as_estimated, not_taken_in_words, with_places_from_cg
 from sysid_node.batch.data_compatibility import check_sensors, corrected
+from sysid_node.batch.dead_sensors import without_dead_sensors
 from sysid_node.batch.methods.constrained_least_squares import FORGETTING, WINDOW, constrained_least_squares
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.error_filtering import error_filtering
@@ -102,6 +103,7 @@ def identify(
         raise InputError("no flight to identify from; give at least one")
     flights = _prepared(as_estimated(aircraft), _named(records), _named(holdout), settings)
     fit, predict = _fitted_with_systematic_errors(method, flights, settings)
+    fit = without_dead_sensors(fit, aircraft, records)
     figures: FiguresByFlight = {}
     for record in flights.holdout:
         coefficients = predicted_coefficients(flights.aircraft, fit.values, [record], settings.low_pass)

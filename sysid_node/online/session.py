@@ -204,8 +204,10 @@ class Session:
             self.samples += 1
             self.lift.add(moment, *_of_lift(sample))
             self.deflections.add_sample(moment, sample[self._controls])
-            if self.signs.wants(moment) and self.signs.add(moment, streaming.stamp_of(self.alignment, moment), sample):
-                self.state.inputs.contradiction = self.signs.found.fault
+            if self.signs.wants(moment):
+                stamp = streaming.stamp_of(self.alignment, moment)
+                if self.signs.add(moment, stamp, sample, opposite_alpha=self.lift.opposite_alpha):
+                    self.state.inputs.contradiction = self.signs.found.fault
             self._heard = time.monotonic()
             if schedule.due(self.schedule, moment, wait):
                 results.append(self.now())

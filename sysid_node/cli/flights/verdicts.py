@@ -82,14 +82,14 @@ def _refusal(path: Path, read: Callable[[], object]) -> str:
     """Why a reader refuses the flight, without the file's name; empty where it does not."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)  # the survey has told them, but for these
-        for told in (".*mean (specific force|lift|airspeed)", ".*interruptions of up to"):
+        for told in (".*mean (specific force|lift|airspeed)", ".*interruptions of up to", ".*no change for"):
             warnings.filterwarnings("always", told, InputWarning)
         try:
             read()
         except InputError as error:
             text = str(error)
             text = text.partition(": ")[2] if text.startswith("flight '") else text
-            for name in (f"{path}: ", f"bag {path.name}: ", f"{path.name}: "):
+            for name in (f"{path}: ", f"bag {path.name}: ", f"{path.name}: ", f"{path.stem}: "):
                 text = text.removeprefix(name)
             return text
         except ModuleNotFoundError as error:  # as the command itself, which needs more packages than this one

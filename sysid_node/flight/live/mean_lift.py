@@ -58,15 +58,24 @@ class MeanLift:
         self._sums["airspeed"] += float(airspeed[known].sum())
         self._sums["alpha"] += float(alpha[angles].sum())
 
-    def check(self, name: str) -> None:
-        """Warn (InputWarning) where the lift is not the aircraft's. Not of a flight shorter than ``AVERAGED``."""
+    @property
+    def _means(self) -> tuple[float, float, float] | None:
+        """Lift coefficient, airspeed (m/s) and angle of attack (rad); None in a flight shorter than ``AVERAGED``."""
         if self.seconds < AVERAGED or not self._sums["pressure"]:
-            return
+            return None
         lift = self._sums["lift"] / (self._sums["pressure"] * self.aircraft.geometry.S)
         known = self._angles >= _MEASURED * self._count
-        alpha = self._sums["alpha"] / self._angles if known else math.nan
-        fault = fault_of(self.aircraft, lift, self._sums["airspeed"] / self._count, alpha)
-        if fault:
+        return lift, self._sums["airspeed"] / self._count, self._sums["alpha"] / self._angles if known else math.nan
+
+    @property
+    def opposite_alpha(self) -> bool:
+        """Whether the lift agrees with the aircraft file by an angle of attack of the other sign, and only by it."""
+        means = self._means
+        return means is not None and _agrees_with_opposite(self.aircraft, means[0], means[2])
+
+    def check(self, name: str) -> None:
+        """Warn (InputWarning) where the lift is not the aircraft's. Not of a flight shorter than ``AVERAGED``."""
+        if (means := self._means) and (fault := fault_of(self.aircraft, *means)):
             warnings.warn(f"{name}: {fault}", InputWarning, stacklevel=2)
 
 
@@ -91,17 +100,29 @@ class RecentMeanLift:
         self._means = [mean + share * (value - mean) for mean, value in zip(self._means, now, strict=True)]
 
     @property
-    def fault(self) -> str:
-        """What does not go together, in words; empty where nothing is wrong, or it is not known yet.
+    def _known(self) -> tuple[float, float, float] | None:
+        """Lift coefficient, airspeed (m/s) and angle of attack (rad); None where they are not known yet.
 
-        Nothing is said at low airspeed, where wheels may carry the aircraft.
+        They are not at low airspeed, where wheels may carry the aircraft.
         """
         lift, pressure, airspeed, alpha, known = self._means
         slow = airspeed < self.aircraft.reference.airspeed / math.sqrt(LARGEST_RATIO)
         if self.seconds < REMEMBERED or slow or not pressure:
-            return ""
+            return None
         angle = alpha / known if known >= _MEASURED else math.nan
-        return fault_of(self.aircraft, lift / (pressure * self.aircraft.geometry.S), airspeed, angle)
+        return lift / (pressure * self.aircraft.geometry.S), airspeed, angle
+
+    @property
+    def opposite_alpha(self) -> bool:
+        """Whether the lift agrees with the aircraft file by an angle of attack of the other sign, and only by it."""
+        known = self._known
+        return known is not None and _agrees_with_opposite(self.aircraft, known[0], known[2])
+
+    @property
+    def fault(self) -> str:
+        """What does not go together, in words; empty where nothing is wrong, or it is not known yet."""
+        known = self._known
+        return fault_of(self.aircraft, *known) if known else ""
 
 
 def fault_of(aircraft: Aircraft, lift: float, airspeed: float, alpha: float) -> str:
@@ -111,11 +132,21 @@ def fault_of(aircraft: Aircraft, lift: float, airspeed: float, alpha: float) -> 
         return _airspeed_fault(aircraft, airspeed, lift)
     if lift_agrees(lift, expected, alpha, aircraft.derivatives["CL_alpha"].value):
         return ""
+    opposite = "is the sign of the angle of attack right? It is positive with air from below"
     return (
         f"mean lift coefficient is {lift:.2f} by the weight, the wing area and the mean airspeed of "
         f"{airspeed:.1f} m/s, and {expected:.2f} by the angle of attack and the derivatives of "
-        f"{aircraft.name!r}: {likely_mistakes()}"
+        f"{aircraft.name!r}: {opposite if _agrees_with_opposite(aircraft, lift, alpha) else likely_mistakes()}"
     )
+
+
+def _agrees_with_opposite(aircraft: Aircraft, lift: float, alpha: float) -> bool:
+    """Whether a mean lift coefficient agrees with the file by an angle of attack -alpha (rad), and not by alpha."""
+    expected, opposite = _expected(aircraft, alpha), _expected(aircraft, -alpha)
+    if math.isnan(expected):
+        return False
+    slope = aircraft.derivatives["CL_alpha"].value
+    return not lift_agrees(lift, expected, alpha, slope) and lift_agrees(lift, opposite, -alpha, slope)
 
 
 def _expected(aircraft: Aircraft, alpha: float) -> float:
@@ -156,9 +187,14 @@ def likely_mistakes() -> str:
     return "is the airspeed in m/s, the angle of attack in rad, the mass in kg, or is it another aircraft's flight?"
 
 
-def checked_lift(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
-    """The record as it is, its mean lift checked. Warns as ``MeanLift.check``."""
+def mean_lift(aircraft: Aircraft, record: FlightRecord) -> MeanLift:
+    """The means over a whole flight."""
     lift = MeanLift(aircraft)
     lift.add(record.time, record["az"], record["V"], record["alpha"], record["rho"])
-    lift.check(record.name)
+    return lift
+
+
+def checked_lift(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
+    """The record as it is, its mean lift checked. Warns as ``MeanLift.check``."""
+    mean_lift(aircraft, record).check(record.name)
     return record

@@ -40,6 +40,7 @@ _TURNS = {
 #: By relation: the angle, the side from which air makes it positive, and by how much the correlation of the other sign
 #: must be above that of an angle that comes late or early. Both are alike where it oscillates as fast as alpha does.
 _FLOW_ANGLES = {"alpha": ("angle of attack", "below", 0.15), "beta": ("sideslip", "the right", 0.05)}
+_WRONG = "the sign is wrong by rates and accelerations; it is positive with air from"
 
 
 class Contradictions(NamedTuple):
@@ -50,9 +51,13 @@ class Contradictions(NamedTuple):
 
 
 class ReadingSigns:
-    """The signs and units of the readings of a flight that comes in pieces."""
+    """The signs and units of the readings of a flight that comes in pieces.
+
+    ``opposite_alpha``: whether the mean lift says that the angle of attack has the wrong sign (``mean_lift``).
+    """
 
     def __init__(self) -> None:
+        self.opposite_alpha = False
         self._relations = KinematicRelations()
 
     def add(self, time: Array, motion: Array, air: Array, attitude: Array) -> None:
@@ -84,9 +89,10 @@ class ReadingSigns:
 
     def _flow_fault(self, found: Mapping[str, Agreement]) -> str:
         """Which flow angles have the wrong sign, in words. One that comes late or early may seem to."""
-        said = "the sign is wrong by rates and accelerations; it is positive with air from"
+        if self.opposite_alpha and found["alpha"].score <= -_LIKELY:
+            return f"angle of attack: {_WRONG} below"
         return "; ".join(
-            f"{angle}: {said} {side}"
+            f"{angle}: {_WRONG} {side}"
             for name, (angle, side, clearer) in _FLOW_ANGLES.items()
             if _opposite(found[name])
             and -found[name].correlation > self._relations.shifted(name) + clearer
@@ -120,8 +126,11 @@ class ReadingSignsInFlight:
         """Whether the sample at a time (s) counts: one in ``EVERY`` s does."""
         return time >= self._next
 
-    def add(self, time: float, stamp_ns: int, sample: Sequence[float]) -> bool:
-        """Count a sample, whose first values are forces, rates and air data. Whether ``found`` is judged anew."""
+    def add(self, time: float, stamp_ns: int, sample: Sequence[float], *, opposite_alpha: bool = False) -> bool:
+        """Count a sample, whose first values are forces, rates and air data. Whether ``found`` is judged anew.
+
+        ``opposite_alpha``: what the mean lift says, as of ``ReadingSigns``.
+        """
         while self._tilts and self._tilts[0][0] < stamp_ns:
             self._tilts.popleft()
         known = bool(self._tilts) and self._tilts[0][0] == stamp_ns
@@ -132,6 +141,7 @@ class ReadingSignsInFlight:
             return False
         self._judged = time
         rows, self._rows = np.array(self._rows), []
+        self._signs.opposite_alpha = opposite_alpha
         self._signs.add(rows[:, 0], rows[:, 1:7], rows[:, 7:10], rows[:, 10:])
         self.found = self._signs.contradictions
         return True
@@ -193,9 +203,13 @@ def _times(seen: Agreement) -> float:
     return math.sqrt(seen.inverse / seen.slope)
 
 
-def checked_signs(record: FlightRecord) -> FlightRecord:
-    """The record as it is, its readings' signs checked. Raises and warns as ``ReadingSigns.check``."""
+def checked_signs(record: FlightRecord, *, opposite_alpha: bool = False) -> FlightRecord:
+    """The record as it is, its readings' signs checked. Raises and warns as ``ReadingSigns.check``.
+
+    ``opposite_alpha``: what the mean lift says, as of ``ReadingSigns``.
+    """
     signs = ReadingSigns()
+    signs.opposite_alpha = opposite_alpha
     missing = np.full(record.time.size, math.nan)
     motion, air, attitude = (
         np.column_stack([record.columns.get(name, missing) for name in names])

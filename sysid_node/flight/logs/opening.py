@@ -18,8 +18,9 @@ from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.live.deflections import checked_deflections
 from sysid_node.flight.live.mean_force import checked_force
-from sysid_node.flight.live.mean_lift import checked_lift
+from sysid_node.flight.live.mean_lift import checked_lift, mean_lift
 from sysid_node.flight.live.reading_signs import checked_signs
+from sysid_node.flight.live.unchanging import checked_readings
 from sysid_node.flight.logs.autopilot_log import AutopilotLog, with_outputs_of
 from sysid_node.flight.logs.checks.refusals import refusal_of_log, refusal_of_streams, require
 from sysid_node.flight.logs.content import Content, content_of, remapped, say_that_axes_are_known
@@ -131,7 +132,9 @@ def load_flight_record(
 
 def _checked(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
     """The record as it is. Raises InputError and warns where it is not a flight of this aircraft in these units."""
-    return checked_deflections(aircraft, checked_lift(aircraft, checked_signs(checked_force(record))))
+    opposite_alpha = mean_lift(aircraft, record).opposite_alpha
+    record = checked_signs(checked_force(record), opposite_alpha=opposite_alpha)
+    return checked_deflections(aircraft, checked_lift(aircraft, checked_readings(aircraft, record)))
 
 
 def is_table(path: str | Path, topics: Mapping[str, str] | None = None, frame: BodyFrame = "flu") -> bool:

@@ -16,7 +16,9 @@ from sysid_node.flight.align import flight_record
 from sysid_node.flight.csv import read_csv
 from sysid_node.flight.frames import BodyFrame
 from sysid_node.flight.live.mean_force import checked_force
+from sysid_node.flight.live.mean_lift import mean_lift
 from sysid_node.flight.live.reading_signs import checked_signs
+from sysid_node.flight.live.unchanging import changing_readings
 from sysid_node.flight.logs.opening import is_table, open_streams
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.flight.streams import Streams
@@ -75,7 +77,7 @@ def load_gap_flight(
     Raises InputError where it is unreadable, lacks a signal or is too short.
     """
     if is_table(path, topics, frame):
-        record = checked_signs(checked_force(read_csv(path)))
+        record = _checked(aircraft, read_csv(path))
         rate = 1.0 / float(np.median(np.diff(record.time)))
         return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
     return flight_of_streams(open_streams(path, aircraft, topics, frame), aircraft, str(path), carried)
@@ -85,10 +87,16 @@ def flight_of_streams(streams: Streams, aircraft: Aircraft, source: str = "", ca
     """The flight of recorded messages. Raises InputError where it lacks a signal or is too short."""
     Actuation.of(aircraft).require(streams.actuators.names, streams.name)
     # commands are held, but the servos are the simulator's own
-    record = checked_signs(checked_force(flight_record(aircraft, streams, 0.2, carried, servos=False)))
+    record = _checked(aircraft, flight_record(aircraft, streams, 0.2, carried, servos=False))
     rates = [1e9 / float(np.median(np.diff(s.arrival.stamp_ns))) for s in streams.by_topic.values()]
     flight = GapFlight(record, rates[0], rates[1], rates[2], source=source)
     return completed_flight(aircraft, replace(flight, command_interval=streams.actuators.interval))
+
+
+def _checked(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
+    """The record as it is. Raises InputError and warns where its readings cannot be those of a flight."""
+    opposite_alpha = mean_lift(aircraft, record).opposite_alpha
+    return changing_readings(aircraft, checked_signs(checked_force(record), opposite_alpha=opposite_alpha))
 
 
 def completed_flight(aircraft: Aircraft, flight: GapFlight) -> GapFlight:

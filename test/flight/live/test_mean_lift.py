@@ -10,7 +10,7 @@ import pytest
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputWarning
-from sysid_node.flight.live.mean_lift import REMEMBERED, MeanLift, RecentMeanLift, checked_lift
+from sysid_node.flight.live.mean_lift import REMEMBERED, MeanLift, RecentMeanLift, checked_lift, mean_lift
 from sysid_node.flight.record import FlightRecord
 
 CDRW = load_aircraft("cdrw")
@@ -59,6 +59,17 @@ def test_an_angle_in_degrees_is_warned_of() -> None:
         checked_lift(CDRW, FlightRecord(TIME, {**flight.columns, "alpha": np.degrees(flight["alpha"])}, "made"))
 
 
+def test_an_angle_of_the_wrong_sign_is_told_from_other_mistakes() -> None:
+    flight = level()
+    opposite = FlightRecord(TIME, {**flight.columns, "alpha": -flight["alpha"]}, "made")
+    assert mean_lift(CDRW, opposite).opposite_alpha
+    with pytest.warns(InputWarning, match=r"0\.26 .* and -0\.2\d .*: is the sign of the angle of attack right\?"):
+        checked_lift(CDRW, opposite)
+    degrees = FlightRecord(TIME, {**flight.columns, "alpha": np.degrees(flight["alpha"])}, "made")
+    assert not any(mean_lift(CDRW, other).opposite_alpha for other in (flight, degrees, level(scale=3.6)))
+    assert not mean_lift(CDRW, level(vane=False)).opposite_alpha
+
+
 def test_a_short_flight_and_a_stall_say_nothing() -> None:
     stalled = level()
     stalled = FlightRecord(TIME, {**stalled.columns, "alpha": np.full(TIME.size, 0.5)}, "made")
@@ -95,6 +106,15 @@ def test_in_flight_airspeed_in_another_unit_is_said(vane: bool) -> None:
 
 def test_in_flight_knots_are_said_where_there_is_a_vane() -> None:
     assert "0.07 by the weight" in flown(scale=1.944).fault
+
+
+def test_in_flight_an_angle_of_the_wrong_sign_is_told() -> None:
+    mean, record = RecentMeanLift(CDRW), level()
+    for time, az, airspeed, alpha, rho in zip(TIME, *(record[n] for n in ("az", "V", "alpha", "rho")), strict=True):
+        mean.add(float(time), float(az), float(airspeed), -float(alpha), float(rho))
+    assert mean.opposite_alpha
+    assert "is the sign of the angle of attack right?" in mean.fault
+    assert not flown().opposite_alpha
 
 
 def test_in_flight_nothing_is_said_of_what_goes_together_or_rolls_on_wheels() -> None:

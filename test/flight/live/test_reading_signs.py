@@ -84,6 +84,18 @@ def test_bundled_flights_with_air_data_late_or_early_are_taken(bag: str, late: f
         checked_signs(changed(flight, **shifted))
 
 
+def test_an_angle_of_attack_that_the_lift_contradicts_too_is_told_sooner() -> None:
+    """In gusts the kinematics alone leave it open."""
+    flight = load_flight_record(ROOT / "bags" / "cdfp_random", load_aircraft("cdfp"))
+    reversed_alpha = changed(flight, alpha=-flight["alpha"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checked_signs(reversed_alpha)
+        checked_signs(flight, opposite_alpha=True)
+    with pytest.raises(InputError, match="angle of attack: the sign is wrong by rates and accelerations"):
+        checked_signs(reversed_alpha, opposite_alpha=True)
+
+
 def test_a_reversed_attitude_of_a_bundled_flight_is_a_warning_alone() -> None:
     flight = load_flight_record(ROOT / "bags" / "cdrw_multistep", load_aircraft("cdrw"))
     with pytest.warns(InputWarning, match="phi, theta, psi of the attitude: the sign is wrong"):
@@ -140,6 +152,21 @@ def test_in_flight_the_same_is_found_within_a_minute(noise: float) -> None:
         assert signs.found.fault.startswith(said)
         assert bool(signs.found.fault) is bool(said)
         assert not signs.found.doubt
+
+
+def test_in_flight_the_lift_helps_to_tell_the_angle_of_attack() -> None:
+    flight = load_flight_record(ROOT / "bags" / "cdfp_random", load_aircraft("cdfp"))
+    names = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta")
+    rows = np.column_stack([-flight[name] if name == "alpha" else flight[name] for name in names])
+    found = {}
+    for opposite in (False, True):
+        signs = ReadingSignsInFlight()
+        for moment, row in zip(flight.time.tolist(), rows.tolist(), strict=True):
+            if signs.wants(moment):
+                signs.add(moment, 0, row, opposite_alpha=opposite)
+        found[opposite] = signs.found.fault
+    assert found[False] == ""
+    assert found[True].startswith("angle of attack: the sign is wrong")
 
 
 def test_in_flight_an_attitude_that_never_comes_is_none() -> None:

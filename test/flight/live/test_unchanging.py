@@ -2,9 +2,23 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from sysid_node.flight.live.unchanging import BREAK, LASTED, READINGS, UnchangingReadings
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.errors import InputError, InputWarning
+from sysid_node.flight.live.unchanging import (
+    BREAK,
+    LASTED,
+    READINGS,
+    UnchangingReadings,
+    changing_readings,
+    checked_readings,
+    unchanging_places,
+)
+from sysid_node.flight.record import FlightRecord
+
+CDRW = load_aircraft("cdrw")
 
 SECONDS = LASTED + 1.0
 AY, P, R, ALPHA, BETA = 1, 3, 5, 7, 8
@@ -25,7 +39,7 @@ def test_one_that_stands_still_is_named(place: int) -> None:
     readings = flown({place})
     assert readings.places == {place}
     assert readings.fault.startswith(f"{READINGS[place]}: no change for 10 s")
-    assert ("publish NaN" in readings.fault) == (place in {ALPHA, BETA})
+    assert ("must be NaN" in readings.fault) == (place in {ALPHA, BETA})
 
 
 def test_nothing_is_said_where_all_move() -> None:
@@ -66,3 +80,35 @@ def test_a_pause_does_not_count() -> None:
         for k in range(900):
             readings.add(begin + 0.01 * k, (0.0,) * 10)
     assert readings.fault == ""
+
+
+def recorded(still: set[int], seconds: float = SECONDS) -> FlightRecord:
+    time = np.arange(round(100 * seconds)) / 100.0
+    names = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta")
+    moving = {name: 20.0 + np.sin(70.0 * time + place) for place, name in enumerate(names)}
+    columns = {
+        name: moving[name] if place not in still else np.full(time.size, 20.0) for place, name in enumerate(names)
+    }
+    return FlightRecord(time, columns, "made")
+
+
+@pytest.mark.parametrize("place", range(len(READINGS)))
+def test_of_a_recorded_flight_the_same_is_said(place: int) -> None:
+    assert unchanging_places(CDRW, recorded({place})) == {place}
+    said = f"made: {READINGS[place]}: no change for 10 s"
+    with pytest.warns(InputWarning, match=said):
+        checked_readings(CDRW, recorded({place}))
+    with pytest.raises(InputError, match=said):
+        changing_readings(CDRW, recorded({place}))
+
+
+def test_recorded_steady_flight_without_noise_is_no_fault() -> None:
+    longitudinal, lateral = {0, 2, 4, 6, 7}, {AY, P, R, BETA}
+    for still in (longitudinal, lateral, longitudinal | lateral):
+        assert unchanging_places(CDRW, recorded(still)) == set()
+    assert unchanging_places(CDRW, recorded(longitudinal | {BETA})) == {BETA}
+
+
+def test_a_short_record_says_nothing() -> None:
+    record = recorded({ALPHA}, seconds=9.0)
+    assert changing_readings(CDRW, record) is record
