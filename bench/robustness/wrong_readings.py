@@ -3,7 +3,8 @@
     python -m bench.robustness.wrong_readings [--first 1] [--page docs/results/wrong_readings.md]
 
 A flight is changed as a user may have it, and read as ``sysid replay`` and ``sysid identify`` read it. Flights shorter
-than 15 s, which tell nothing, are left out. ``SYSID_FLIGHTS`` names the folder of the real flights.
+than 15 s, which tell nothing, are left out. ``SYSID_FLIGHTS`` names the folder of the real flights, whose lift is not
+compared with an aircraft file.
 """
 
 from __future__ import annotations
@@ -15,14 +16,17 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from bench.pages import publish, table
 from bench.robustness.flights import grouped
 from sysid_node import load
+from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.csv import read_csv
+from sysid_node.flight.live.mean_lift import mean_lift
 from sysid_node.flight.live.reading_signs import checked_signs
 from sysid_node.flight.record import FlightRecord
 
@@ -57,7 +61,7 @@ def main() -> None:
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     warnings.simplefilter("ignore")
-    groups = grouped(_real(), lambda bag, name: load(bag, name).record, args.first)
+    groups = grouped(_real(), _read, args.first)
     rows = [(mistake, *(_share(flights, *_MISTAKES[mistake]) for flights in groups.values())) for mistake in _MISTAKES]
     rows += [
         (
@@ -70,26 +74,37 @@ def main() -> None:
     publish("bench/robustness/wrong_readings.py", table(heads, rows), args.page)
 
 
-def _real() -> Iterator[FlightRecord]:
+class _Flight(NamedTuple):
+    record: FlightRecord
+    aircraft: Aircraft | None
+
+
+def _read(bag: Path, name: str) -> _Flight:
+    flight = load(bag, name)
+    return _Flight(flight.record, flight.aircraft)
+
+
+def _real() -> Iterator[_Flight]:
     folder = Path(os.environ.get("SYSID_FLIGHTS", ""))
     for path in sorted(folder.glob("*.csv")) if folder.name else []:
         flight = read_csv(path)
         if flight.time[-1] - flight.time[0] >= _SHORTEST:
-            yield flight
+            yield _Flight(flight, None)
 
 
-def _late(flight: FlightRecord, seconds: float) -> FlightRecord:
+def _late(flight: _Flight, seconds: float) -> _Flight:
     """The flight with air data that come so late: an error of the stamps, which is not refused."""
-    columns = dict(flight.columns)
+    record = flight.record
+    columns = dict(record.columns)
     columns |= {
-        name: np.interp(flight.time - seconds, flight.time, columns[name])
+        name: np.interp(record.time - seconds, record.time, columns[name])
         for name in ("V", "alpha", "beta")
         if name in columns
     }
-    return replace(flight, columns=columns)
+    return flight._replace(record=replace(record, columns=columns))
 
 
-def _share(flights: list[FlightRecord], factors: Mapping[str, float], said: str) -> str:
+def _share(flights: list[_Flight], factors: Mapping[str, float], said: str) -> str:
     """How many flights are refused for what is wrong, and how many for something else."""
     texts = [_fault(flight, factors) for flight in flights]
     right = sum(bool(text) and said in text for text in texts)
@@ -97,12 +112,14 @@ def _share(flights: list[FlightRecord], factors: Mapping[str, float], said: str)
     return f"{right} and {other} otherwise" if other else str(right)
 
 
-def _fault(flight: FlightRecord, factors: Mapping[str, float]) -> str:
+def _fault(flight: _Flight, factors: Mapping[str, float]) -> str:
     """Why the flight is refused with its readings changed; empty where it is not."""
-    columns = dict(flight.columns)
+    columns = dict(flight.record.columns)
     columns |= {name: factor * columns[name] for name, factor in factors.items() if name in columns}
+    record = replace(flight.record, columns=columns, name="flight")
+    opposite_alpha = flight.aircraft is not None and mean_lift(flight.aircraft, record).opposite_alpha
     try:
-        checked_signs(replace(flight, columns=columns, name="flight"))
+        checked_signs(record, opposite_alpha=opposite_alpha)
     except InputError as error:
         return str(error).removeprefix("flight: ")
     return ""

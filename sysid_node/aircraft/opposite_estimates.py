@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
+from sysid_node.aircraft.common_factors import common_factors
 from sysid_node.aircraft.model import Aircraft, Control
 
 _MOMENTS = ("Cl", "Cm", "Cn")
@@ -28,7 +29,8 @@ class _Estimate(Protocol):
 
 def opposite_estimates(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
     """What valid estimates show, a sentence each; none where nothing is wrong."""
-    return [*reversed_controls(aircraft, estimates), *other_readings(aircraft, estimates)]
+    found = [*reversed_controls(aircraft, estimates), *other_readings(aircraft, estimates)]
+    return found or common_factors(aircraft, estimates)
 
 
 def reversed_controls(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
