@@ -294,6 +294,7 @@ def flight_record(
     aligned = align(aircraft, streams, max_gap, carried, afterwards=True, servos=servos)
     _require_one_clock(streams, aligned)
     if aligned.used.size < 2:
+        Actuation.of(aircraft).require(streams.actuators.names, streams.name)
         raise InputError(why_nothing_aligned(streams.name, stamp_spans(streams), aligned.rejected, max_gap))
     samples, names = aligned.samples, sample_columns(aircraft)
     if samples.shape[1] > len(names):

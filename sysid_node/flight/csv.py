@@ -18,18 +18,21 @@ import numpy as np
 from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
 from sysid_node.flight.csv_checks import check_names, check_time, implausible
-from sysid_node.flight.record import COLUMNS, FlightRecord
+from sysid_node.flight.record import COLUMNS, Array, FlightRecord
 
 TIME = "t"
 SIZE_LIMIT = 2 * 10**9  # bytes: a day at 200 Hz has 1.5e9
 LINE_LIMIT = 2**17  # characters
+#: Share of samples whose time does not increase from which on the lines are in no order.
+WRONG_ORDER = 0.02
 
 
 def read_csv(path: str | Path) -> FlightRecord:
     """The flight in a CSV file; a column with another name is taken as a further control.
 
-    Samples with values that no aircraft measures are left out and counted in ``rejected``. Raises InputError that names
-    file and line where a cell is no number, a row is incomplete or time does not increase, and where units are wrong.
+    Samples with values that no aircraft measures, and the few whose time does not increase, are left out and counted in
+    ``rejected``. Raises InputError that names file and line where a cell is no number, a row is incomplete or time does
+    not increase in many lines, and where units are wrong.
     Warns (InputWarning) where a column is missing.
     """
     path = Path(path)
@@ -39,16 +42,38 @@ def read_csv(path: str | Path) -> FlightRecord:
         if not names:
             raise InputError(f"is empty: no column {TIME!r}, and no other")
         check_names(names, TIME)
-        table = np.array([_numbers(names, reader.line_num, row) for row in reader if row])
-        if len(table) < 2:
-            raise InputError(f"{len(table)} samples; at least 2 are needed")
-        columns = dict(zip(names, np.ascontiguousarray(table.T), strict=True))
+        rows = [(reader.line_num, *_numbers(names, reader.line_num, row)) for row in reader if row]
+        if len(rows) < 2:
+            raise InputError(f"{len(rows)} samples; at least 2 are needed")
+        table, rejected = _in_order(np.array(rows), 1 + names.index(TIME))
+        columns = dict(zip(names, np.ascontiguousarray(table.T[1:]), strict=True))
         time = columns.pop(TIME)
-        whole = FlightRecord(time, columns, path.stem)
+        whole = FlightRecord(time, columns, path.stem, rejected=rejected)
         check_time(time)
         if not any(whole.measured(name) for name in COLUMNS):
             raise InputError("no values in any column of a flight; was something recorded?")
         return _plausible(whole)
+
+
+def _in_order(table: Array, at: int) -> tuple[Array, dict[str, int]]:
+    """The rows whose time, in column ``at``, is later than that of all rows before, and how many others by reason.
+
+    The first column holds the lines' numbers. Raises InputError where there are many others.
+    """
+    time = table[:, at]
+    latest = np.maximum.accumulate(np.concatenate([[-np.inf], time[:-1]]))
+    later = time > latest
+    if later.all():
+        return table, {}
+    if np.count_nonzero(~later) > WRONG_ORDER * time.size:
+        first = int(np.argmin(later))
+        raise InputError(
+            f"line {table[first, 0]:.0f}: time {time[first]:g} s follows {latest[first]:g} s, and of {time.size} "
+            f"samples {np.count_nonzero(~later)} do not increase; sort the lines by time, or make two flights of it"
+        )
+    twice = int(np.count_nonzero(time[~later] == latest[~later]))
+    counts = {"time stamp twice": twice, "time goes back": int(np.count_nonzero(~later)) - twice}
+    return table[later], {reason: count for reason, count in counts.items() if count}
 
 
 def _plausible(flight: FlightRecord) -> FlightRecord:
@@ -62,7 +87,7 @@ def _plausible(flight: FlightRecord) -> FlightRecord:
         worst, count = reasons.most_common(1)[0]
         raise InputError(f"no two samples are plausible: {count} x {worst}; correct the columns")
     columns = {name: values[kept] for name, values in flight.columns.items()}
-    return FlightRecord(flight.time[kept], columns, flight.name, flight.start_ns, dict(reasons))
+    return FlightRecord(flight.time[kept], columns, flight.name, flight.start_ns, {**flight.rejected, **reasons})
 
 
 @contextmanager

@@ -32,6 +32,19 @@ _EXPECTED = (*_MOTION, "V", "alpha", "beta")
 #: A ratio between 57.3 / 3 and 57.3 * 3 is taken for degrees; that of sound data is near 1.
 _DEGREES = (math.degrees(1.0) / 3.0, math.degrees(1.0) * 3.0)
 _SPAN, _CORRELATED = 1.0, 0.7  # s; least correlation at which a ratio counts
+#: What the columns are called elsewhere.
+_OTHER_WORDS = {
+    "V": ("tas", "va", "airspeed", "true_airspeed"),
+    "alpha": ("aoa", "alfa", "angle_of_attack"),
+    "beta": ("aos", "ssa", "sideslip", "angle_of_sideslip"),
+    "phi": ("roll", "bank"),
+    "theta": ("pitch",),
+    "psi": ("yaw", "heading"),
+    "rho": ("density", "air_density"),
+    "de": ("elevator", "elev"),
+    "da": ("aileron", "ail"),
+    "dr": ("rudder", "rud"),
+}
 
 _ANGLES = {
     "phi": (1.01 * math.pi, "phi over pi rad (degrees?)"),
@@ -60,7 +73,7 @@ def check_names(names: Sequence[str], time: str) -> None:
     others = [name for name in names if name not in COLUMNS and name != time]
     missing = []
     for column in (name for name in COLUMNS if name not in names):
-        alike = _alike(column, others)
+        alike = likely_name(column, others)
         if alike:
             _warn(f"no column {column!r}, but {alike!r}, which is taken for a further control; is it {column!r}?")
         elif column in _EXPECTED:
@@ -151,11 +164,12 @@ def _put(faults: NDArray[np.object_], others: NDArray[np.object_]) -> None:
     faults[found] = others[found]
 
 
-def _alike(column: str, others: Sequence[str]) -> str | None:
-    """The name that is likely a misspelling of the column's."""
+def likely_name(column: str, others: Sequence[str]) -> str | None:
+    """The name among ``others`` by which the column is likely meant: another word for it, or a misspelling."""
     folded = {name.casefold().strip("_ "): name for name in others}
-    if column.casefold() in folded:
-        return folded[column.casefold()]
+    for word in (column.casefold(), *_OTHER_WORDS.get(column, ())):
+        if word in folded:
+            return folded[word]
     if len(column) < 3:
         return None
     found = get_close_matches(column.casefold(), list(folded), n=1, cutoff=0.75)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.flight.csv import read_csv, write_csv
-from sysid_node.flight.record import FlightRecord
+from sysid_node.flight.record import COLUMNS, FlightRecord
 
 
 def file_with(tmp_path, text):
@@ -46,13 +46,37 @@ def test_round_trip_to_the_last_bit(tmp_path):
         ("t,ax\n0,1\n1,fast\n", "line 3, column 'ax': got 'fast'"),
         ("t,ax\n0,1\n1,inf\n", "line 3, column 'ax': got 'inf'"),
         ("t,ax\n0,1\n,2\n", "line 3, column 't'"),
-        ("t,ax\n0,1\n1,2\n1,3\n", "time must increase; sample 2"),
+        ("t,ax\n0,1\n1,2\n1,3\n", "line 4: time 1 s follows 1 s, and of 3 samples 1 do not increase; sort the lines"),
     ],
 )
 def test_mistakes_are_one_line_with_the_place(tmp_path, text, said):
     with pytest.raises(InputError, match=said) as caught:
         read_csv(file_with(tmp_path, text))
     assert "log.csv" in str(caught.value)
+
+
+def test_the_few_samples_whose_time_does_not_increase_are_left_out_and_counted(tmp_path):
+    """As a log has them whose clock was corrected; truth: the same file without them."""
+    rows = [f"{k / 100:.2f},{k}" for k in range(200)]
+    wrong = [*rows[:50], rows[49], *rows[50:120], "0.90,7", *rows[120:]]
+    head = "t,ax,ay,az,p,q,r,V,alpha,beta\n"
+    flights = [
+        read_csv(file_with(tmp_path, head + "\n".join(f"{row}{',1' * 8}" for row in each) + "\n"))
+        for each in (rows, wrong)
+    ]
+    assert flights[1].rejected == {"time stamp twice": 1, "time goes back": 1}
+    np.testing.assert_array_equal(flights[1].time, flights[0].time)
+    np.testing.assert_array_equal(flights[1]["ax"], flights[0]["ax"])
+
+
+@pytest.mark.parametrize(
+    ("column", "called"), [("alpha", "Alpha"), ("alpha", "aoa"), ("V", "TAS"), ("beta", "sideslip"), ("de", "Elevator")]
+)
+def test_a_column_by_another_name_is_asked_for(tmp_path, column, called):
+    names = ["t", *(called if name == column else name for name in COLUMNS)]
+    rows = "\n".join(",".join([str(k), *["1"] * len(COLUMNS)]) for k in range(3))
+    with pytest.warns(InputWarning, match=f"no column '{column}', but '{called}'"):
+        read_csv(file_with(tmp_path, f"{','.join(names)}\n{rows}\n"))
 
 
 def test_files_that_cannot_be_read(tmp_path):

@@ -10,7 +10,7 @@ derivatives on top of the tables. The regressor CL^2 is that of the whole lift.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -28,7 +28,8 @@ from sysid_node.dynamics.rigid_body import known_moments
 from sysid_node.dynamics.tables import array_tables, full_thrust, mach_number, need_mach
 from sysid_node.dynamics.vector import Vector
 from sysid_node.errors import InputError
-from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.flight.csv_checks import likely_name
+from sysid_node.flight.record import COLUMNS, Array, FlightRecord
 
 _AXES = ("x", "y", "z")
 _ALWAYS = ("ax", "ay", "az", "p", "q", "r", "V")
@@ -182,8 +183,20 @@ def _check_measured(aircraft: Aircraft, record: FlightRecord) -> None:
     if missing:
         raise InputError(
             f"flight {record.name!r}: {', '.join(missing)} not measured, which the model of aircraft {aircraft.name} "
-            "needs; record them or take their derivatives out of the aircraft file"
+            f"needs; {_remedy(missing, [name for name in record.columns if name not in COLUMNS])}"
         )
+
+
+def _remedy(missing: Sequence[str], others: Sequence[str]) -> str:
+    """What to do where columns are missing, in a flight that has ``others`` besides those of every flight."""
+    meant = [(name, other) for name in missing if (other := likely_name(name, others))]
+    if meant:
+        return "; ".join(f"is {other!r} what is called {name!r} here? Rename it then" for name, other in meant)
+    if {*missing} <= {"alpha", "beta"}:
+        return "record it, or use output_error or filter_error, which need no vanes"
+    if {*missing} <= {*_ALWAYS}:
+        return "record it"
+    return "record it, or take the derivatives by it out of the aircraft file"
 
 
 def _complete_samples(aircraft: Aircraft, record: FlightRecord) -> tuple[FlightRecord, int]:

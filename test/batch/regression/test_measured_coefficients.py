@@ -77,3 +77,20 @@ def test_what_tables_add_is_subtracted_and_the_polar_has_the_whole_lift():
     for name, value in found.regressors.items():
         np.testing.assert_array_equal(value, plain.regressors[name])
     assert set(found.tabulated) == set(added)
+
+
+@pytest.mark.parametrize(
+    ("missing", "column", "said"),
+    [
+        ("beta", "", "beta not measured.*needs; record it, or use output_error or filter_error, which need no vanes"),
+        ("V", "", "V not measured.*needs; record it$"),
+        ("de", "", "de not measured.*needs; record it, or take the derivatives by it out of the aircraft file"),
+        ("alpha", "AoA", "alpha not measured.*needs; is 'AoA' what is called 'alpha' here"),
+    ],
+)
+def test_what_is_not_measured_is_named_with_a_remedy(missing, column, said):
+    record = flight(1)
+    columns = {name: values for name, values in record.columns.items() if name != missing}
+    columns |= {column: record[missing]} if column else {}
+    with pytest.raises(InputError, match=said):
+        measured_coefficients(KESTREL, FlightRecord(record.time, columns, "made"))
