@@ -90,11 +90,14 @@ def take(state: MonitorState, block: Block) -> None:
     """Take a block."""
     history = state.history
     if not block.follows:
+        if history.latest is not None and _learning(state):
+            # the last blocks before a gap are never learned from, nor the first after it
+            history.lost += min(len(history.pieces), LAG) + ORDER
         history.raw.clear()
         history.pieces.clear()
     design, residual = _compare_with_reference(state, block)
     history.count, history.latest = history.count + 1, block
-    learning = history.count * PERIOD <= state.settings.learning
+    learning = _learning(state)
     if learning:
         _learn(state, block, residual)
         if history.count % RENEWED == 0:
@@ -104,9 +107,18 @@ def take(state: MonitorState, block: Block) -> None:
         history.pieces.append(piece)
         if not learning:
             _judge(state, piece)
-        elif history.count * PERIOD > SETTLED * state.settings.learning:
+        elif learned(state) > SETTLED * state.settings.learning:
             _learn_model(state)
     history.raw.append(_compare_with_reference(state, block))
+
+
+def learned(state: MonitorState) -> float:
+    """Seconds of flight that count as learned from. Gaps during learning prolong it."""
+    return (state.history.count - state.history.lost) * PERIOD
+
+
+def _learning(state: MonitorState) -> bool:
+    return learned(state) <= state.settings.learning
 
 
 def _compare_with_reference(state: MonitorState, block: Block) -> tuple[Array, Array]:

@@ -66,6 +66,7 @@ class BlockHistory:
     """The blocks so far, of which the last are kept."""
 
     count: int = 0
+    lost: int = 0  # of these, that gaps took from what the reference model learns at the start
     latest: Block | None = None
     raw: deque[tuple[Array, Array]] = field(default_factory=lambda: deque(maxlen=ORDER))  # design (6, D), residual (6,)
     pieces: deque[WhitenedBlock] = field(default_factory=lambda: deque(maxlen=LONGEST))

@@ -57,7 +57,7 @@ class MessageWatch:
     @property
     def judged(self) -> float:
         """Seconds of flight that were checked for faults."""
-        return max(0.0, self.state.history.count * blocks.PERIOD - self.state.settings.learning)
+        return max(0.0, monitor.learned(self.state) - self.state.settings.learning)
 
 
 def init(aircraft: Aircraft, settings: FaultMonitorSettings, stale_after: float) -> MessageWatch:

@@ -196,6 +196,21 @@ def test_a_gap_is_bridged_without_an_alarm() -> None:
     assert fly(state, maker, 20.0) is None
 
 
+def test_a_gap_prolongs_the_learning_by_what_it_takes_from_it() -> None:
+    """Of each stretch of flight the last 8 s are not learned from, until later flight has shown no fault in them."""
+    state, maker = monitored(seed=9)
+    fly(state, maker, 10.0)
+    assert monitor.learned(state) == pytest.approx(10.0)
+    maker.count += 100
+    monitor.take(state, maker.block()._replace(follows=False))
+    after = monitor.learned(state)
+    assert 1.5 < after < 2.5
+    fly(state, maker, 20.0)
+    assert monitor.learned(state) == pytest.approx(after + 20.0)
+    monitor.take(state, maker.block()._replace(follows=False))  # it has ended
+    assert monitor.learned(state) == pytest.approx(after + 20.0 + PERIOD)
+
+
 @pytest.mark.slow
 def test_a_gap_while_a_fault_is_followed() -> None:
     state, maker = flown(seed=12)

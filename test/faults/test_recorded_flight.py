@@ -61,6 +61,22 @@ def test_the_failure_that_was_flown_is_found(verdict: FaultVerdict) -> None:
 
 
 @pytest.mark.slow
+def test_air_data_that_fail_for_ten_seconds_while_it_learns_are_no_damage() -> None:
+    """Nothing failed in this flight; what came after the outage had been compared with what was never learned."""
+    streams = read_streams(BAGS / "cdrw_multistep")
+    values = streams.air_data.values.copy()
+    seconds = (streams.air_data.arrival.log_ns - streams.imu.arrival.log_ns[0]) / 1e9
+    values[(seconds > 10.0) & (seconds < 20.0), 1] = np.nan
+    found = judge(
+        AIRCRAFT,
+        FaultMonitorSettings(),
+        dataclasses.replace(streams, air_data=dataclasses.replace(streams.air_data, values=values)),
+    )
+    assert not found.episodes
+    assert 15.0 < found.judged < 25.0
+
+
+@pytest.mark.slow
 def test_it_is_what_the_live_functions_say_message_by_message(flight: Streams, verdict: FaultVerdict) -> None:
     """In the order of arrival, with a look every tenth of a second: the same, to the last bit."""
     watch, speech, said = watching.init(AIRCRAFT, FaultMonitorSettings(), 0.5), watching.Announcements(), []
