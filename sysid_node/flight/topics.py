@@ -10,6 +10,7 @@ from sysid_node.errors import InputError
 IMU = "imu/data"
 AIR_DATA = "air_data"
 ACTUATORS = "actuators"
+EXCITATION = "actuators/excitation"  # of the exciter, to the controller
 
 INPUT_TOPICS: Mapping[str, str] = MappingProxyType(
     {

@@ -128,7 +128,8 @@ PARAMETERS = (
         "valid_fraction",
         _ESTIMATOR.valid_fraction,
         "",
-        "A derivative is valid once its standard error is under this share of its size.",
+        "A derivative is valid once its standard error is under this share of its size: of the aircraft file's value, "
+        "or of twice its tolerance where that is more.",
         "Down for a controller that needs precise values, up for one that needs them early.",
         lower=0.001,
         upper=100.0,

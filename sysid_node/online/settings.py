@@ -40,7 +40,7 @@ class OnlineSettings:
     actuators: str = "auto"  # what the topic actuators carries: "commands", "positions", or "auto", by the messages
     use_prior: bool = False  # whether the aircraft file's derivatives count, by their tolerances
     detect_changes: bool = True  # forget what was before an abrupt change of the aircraft
-    valid_fraction: float = 0.3  # a derivative is valid once its standard error is under this share of its size
+    valid_fraction: float = 0.3  # a derivative is valid once its standard error is under this share of its file's size
 
     def __post_init__(self) -> None:
         check_frequencies(self.frequencies)

@@ -27,7 +27,7 @@ from sysid_node.flight.live import messages
 from sysid_node.flight.live.arrivals import Arrivals
 from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
 from sysid_node.flight.live.monitor import Durations
-from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
+from sysid_node.flight.topics import ACTUATORS, AIR_DATA, EXCITATION, IMU
 from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, setting
 from sysid_node.ros.support import conversion
 from sysid_node.ros.support.conversion import NANOSECONDS, stamp_ns
@@ -35,7 +35,6 @@ from sysid_node.ros.support.loop_node import (
     COMMAND,
     CORRELATION,
     DERIVATIVES,
-    EXCITATION,
     LAG,
     LAST_QOS,
     LATEST,

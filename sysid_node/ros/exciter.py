@@ -24,10 +24,10 @@ from sysid_node.faults.types import DAMAGE, HARD_OVER, LOSS, NOT_FOLLOWING, SHIF
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.flight_time import FlightTime
 from sysid_node.flight.live.messages import ATTITUDE_PATHS, PATHS, Numbers, Texts
-from sysid_node.flight.topics import AIR_DATA, IMU
+from sysid_node.flight.topics import AIR_DATA, EXCITATION, IMU
 from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, setting
 from sysid_node.ros.support import conversion
-from sysid_node.ros.support.loop_node import DERIVATIVES, EXCITATION, LATEST, STANDING, LoopNode, named
+from sysid_node.ros.support.loop_node import DERIVATIVES, LATEST, STANDING, LoopNode, named
 from sysid_node.ros.support.spin import run_node
 
 _DEFAULT = ExcitationSettings()
@@ -175,6 +175,9 @@ class Exciter(LoopNode):
 
     def _on_start(self, _: Any, response: Any) -> Any:
         try:
+            imu = self.inputs[IMU]
+            if not imu.received:
+                raise InputError(f"{imu.name}: no message yet; excitation needs the attitude and the load factor")
             exciter.start(self._state, self._now, self._limited())
             until = f"until {', '.join(self._state.settings.derivatives)} are known"
             response.success, response.message = True, f"{until}{self._unheard()}"

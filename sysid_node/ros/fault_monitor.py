@@ -22,7 +22,7 @@ from sysid_node.flight.align import counts_by_reason
 from sysid_node.flight.live import messages
 from sysid_node.flight.live.messages import PATHS, Numbers, Texts
 from sysid_node.flight.live.monitor import Durations
-from sysid_node.flight.live.recent_counts import FEW, RecentCounts
+from sysid_node.flight.live.recent_counts import RecentCounts
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU
 from sysid_node.parameter import AIRCRAFT, BODY_FRAME, NodeParameter, setting
 from sysid_node.ros.support import conversion
@@ -103,7 +103,7 @@ class FaultMonitor(LoopNode):
         rejected = counts_by_reason({names[topic]: of for topic, of in self._watch.alignment.rejected.items()})
         monitors = [self.inputs[topic] for topic in names]
         recent = self._recent.update(monitors, rejected)
-        wrong = rejections([topic for topic in recent if topic.share > FEW], names, MOST_GAP, parameter="")
+        wrong = rejections([topic for topic in recent if topic.troubled], names, MOST_GAP, parameter="")
         now = time.monotonic()
         if any(monitor.waited() > UNHEARD for monitor in monitors):
             self._since = now

@@ -30,7 +30,7 @@ from sysid_node.flight.live import messages
 from sysid_node.flight.live.conditions import Conditions
 from sysid_node.flight.live.messages import UNREADABLE, Numbers, Texts
 from sysid_node.flight.live.monitor import Durations, TopicMonitor
-from sysid_node.flight.live.recent_counts import FEW, RecentCounts, RecentTopic
+from sysid_node.flight.live.recent_counts import RecentCounts, RecentTopic
 from sysid_node.flight.topics import ACTUATORS, AIR_DATA, IMU, INPUT_TOPICS
 from sysid_node.online.estimates.saving import save_estimates
 from sysid_node.online.estimates.serialisation import EstimatesSerialiser
@@ -285,7 +285,7 @@ class Identifier(CarefulNode):
             if monitor.waited() > UNHEARD
         }
         names = {monitor.name: monitor.resolved for monitor in monitors}
-        present |= rejections([t for t in recent if t.share > FEW], names, session.settings.max_gap)
+        present |= rejections([t for t in recent if t.troubled], names, session.settings.max_gap)
         joints, here = expected_joints(session.aircraft), self._monitors[ACTUATORS].resolved
         missing = [joint for joint in joints if joint not in self._joints]
         if missing and here in present and self._joints:

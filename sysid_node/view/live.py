@@ -28,6 +28,8 @@ _EXCITED_BY = {
     "alpha": "elevator", "q": "elevator", "de": "elevator", "p": "aileron", "da": "aileron",
     "beta": "rudder", "r": "rudder", "dr": "rudder",
 }  # fmt: skip
+#: How the statuses begin that a movement of the surfaces ends.
+_MOTION_HELPS = ("converging", "not excited", "collinear with")
 
 
 class LiveScene:
@@ -91,8 +93,10 @@ class LiveScene:
             return f"# {self._aircraft.name}, live\n\nNo estimate has come yet."
         valid = sum(d.valid for d in known.values())
         lines = [f"# {valid} of {len(known)} valid after {estimates.time:.0f} s"]
+        wanting = [n for n, d in known.items() if not d.valid]
+        moved = [n for n in wanting if known[n].status.startswith(_MOTION_HELPS)]
         missing = {
-            control: [n for n, d in known.items() if not d.valid and _EXCITED_BY.get(n.partition("_")[2]) == control]
+            control: [n for n in moved if _EXCITED_BY.get(n.partition("_")[2]) == control]
             for control in dict.fromkeys(_EXCITED_BY.values())
         }
         if any(d.status == "stale input" for d in known.values()):
@@ -100,6 +104,9 @@ class LiveScene:
         for control, names in sorted(missing.items(), key=lambda pair: -len(pair[1])):
             if names:
                 lines.append(f"**Move the {control}**: {', '.join(f'{n} ({known[n].status})' for n in names)}.")
+        others = [f"{n} ({known[n].status})" for n in wanting if n not in moved]
+        if others:
+            lines.append(f"**Manoeuvres do not help**: {', '.join(others)}.")
         return "\n\n".join(lines if len(lines) > 1 else [*lines, "Nothing that a control excites is missing."])
 
     def _derivatives(self, estimates: Sequence[Estimates]) -> dict[str, list[PlotPanel]]:

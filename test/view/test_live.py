@@ -23,6 +23,7 @@ from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimate, DerivativeEstimates
 
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.online import types
 from sysid_node.ros.support.conversion import header
 from sysid_node.ros.support.flight_watch import FlightWatch
 from sysid_node.view.live import LiveScene
@@ -107,6 +108,20 @@ def test_the_aircraft_flies_on_east(recorded: Recorded) -> None:
     order = np.argsort(time, kind="stable")
     time, position = time[order], position[order]
     np.testing.assert_allclose(position[-1] - position[0], [0.0, 20.0 * (time[-1] - time[0]), 0.0], atol=0.5)
+
+
+def test_what_no_manoeuvre_helps_is_said_apart() -> None:
+    """Statuses as of the identifier; what to do about them is in the reference."""
+    scene = LiveScene(load_aircraft("cdrw"))
+    statuses = {"Cm_de": "de not on time", "Cl_p": "not excited", "CL_q": "converging", "Cm_q": "ok"}
+    derivatives = {
+        name: types.DerivativeEstimate(name, 1.0, 0.1, 0.8, 1.2, status == "ok", status)
+        for name, status in statuses.items()
+    }
+    text = scene.words(types.Estimates(12.0, derivatives, {}))
+    assert "**Move the elevator**: CL_q (converging)." in text
+    assert "**Move the aileron**: Cl_p (not excited)." in text
+    assert "**Manoeuvres do not help**: Cm_de (de not on time)." in text
 
 
 def test_what_moves_fails_and_is_missing_is_said(recorded: Recorded) -> None:

@@ -12,6 +12,7 @@ from sysid_node.flight.live.monitor import TopicMonitor
 
 WINDOW = 10.0  # s
 ALL, FEW = 0.9, 0.01  # shares of a topic's messages: as good as all, and so few that they are no trouble
+STRAY = 2  # messages that are no trouble: when topics begin, the first has no neighbour in the others
 
 
 class RecentTopic(NamedTuple):
@@ -25,6 +26,11 @@ class RecentTopic(NamedTuple):
     def share(self) -> float:
         """The share of messages that were rejected."""
         return sum(self.rejected.values()) / max(self.received, 1)
+
+    @property
+    def troubled(self) -> bool:
+        """Whether so many were rejected that something is wrong."""
+        return self.share > FEW and sum(self.rejected.values()) > STRAY
 
     @property
     def most(self) -> str:

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from sysid_node.flight.checks import gap
 from sysid_node.flight.live.monitor import Durations, TopicMonitor
-from sysid_node.flight.live.recent_counts import ALL, FEW, RecentTopic
+from sysid_node.flight.live.recent_counts import ALL, RecentTopic
 from sysid_node.online.types import Estimates
 
 OK, WARN, ERROR, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
@@ -66,8 +66,8 @@ class DiagnosticSource:
         faults += [f"{name}: {text}" for name, text in wrong.items()]
         unlikely = [words for words in wrong_readings if words]
         faults += [*unlikely, *filter(None, [doubt])]
-        worst = max((topic.share for topic in recent if topic.rejected), default=0.0)
-        level = STALE if silent else ERROR if worst >= ALL or unlikely else WARN if worst > FEW or doubt else OK
+        worst = max((topic.share for topic in recent if topic.troubled), default=0.0)
+        level = STALE if silent else ERROR if worst >= ALL or unlikely else WARN if worst or doubt else OK
         return self._status("input", level, "; ".join(faults) or "all topics arrive", values)
 
     def waits(self, part: str) -> DiagnosticStatus:

@@ -31,7 +31,6 @@ from sysid_node.ros.support.silence import UNHEARD, ClockWatch, joined, several_
 from sysid_node.ros.support.spin import while_ros_is_up
 
 COMMAND = "actuators/command"
-EXCITATION = "actuators/excitation"
 SET_POINTS = "set_points"
 DERIVATIVES = "identifier/derivatives"
 CORRELATION = "identifier/correlation"

@@ -12,6 +12,8 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
+from sysid_node.flight.topics import EXCITATION
+
 UNHEARD = 2.0  # s without a message, after which a node says so in its log
 SHOWN = 3  # topics of the right type that are named at most
 
@@ -65,9 +67,22 @@ class ClockWatch:
 def _elsewhere(node: Node, topic: str, wanted: str) -> str:
     """The topics with messages of the type that is wanted, in words; empty where there are none."""
     names = [name for name, types in node.get_topic_names_and_types() if wanted in types and name != topic]
-    found = sorted(name for name in names if node.count_publishers(name))
+    found = sorted(name for name in names if node.count_publishers(name) and not _for_another(node, name))
     more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
     return f", but {wanted} is published on {', '.join(found[:SHOWN])}{more}: remap it?" if found else ""
+
+
+def _for_another(node: Node, topic: str) -> bool:
+    """Whether a topic is none that this node might hear in place of its own.
+
+    It is the input of another aircraft's node of the same name, or what a node publishes under its own name, or the
+    excitation.
+    """
+    heard = node.get_subscriptions_info_by_topic(topic)
+    if topic.endswith(f"/{EXCITATION}") or any(one.node_name == node.get_name() for one in heard):
+        return True
+    publishers = node.get_publishers_info_by_topic(topic)
+    return all(topic.startswith(f"{one.node_namespace.rstrip('/')}/{one.node_name}/") for one in publishers)
 
 
 def _type_name(kind: Any) -> str:

@@ -59,6 +59,12 @@ def test_one_bad_message_is_not_the_same_as_all(count: int, level: bytes) -> Non
     assert status.message.startswith("/uav1/imu/data: ")
 
 
+@pytest.mark.parametrize("received", [2, 20])
+def test_the_first_messages_without_neighbours_in_other_topics_are_no_trouble(received: int) -> None:
+    imu, rejected = heard("imu/data", received), {"imu/data: air_data gap": 2}
+    assert SOURCE.input([imu], rejected, 60.0, RecentCounts().update([imu], rejected)).level == OK
+
+
 def test_what_was_rejected_at_the_start_is_forgotten_after_ten_seconds() -> None:
     now = [0.0]
     imu, recent, levels = TopicMonitor("imu/data"), RecentCounts(lambda: now[0]), []

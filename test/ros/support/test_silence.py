@@ -42,6 +42,21 @@ def test_topics_of_the_type_elsewhere_are_named(node: Node, probe: Probe) -> Non
     probe.until(lambda: why_silent(node, subscription) == f"{words} and 1 more: remap it?")
 
 
+def test_what_another_aircraft_hears_and_what_nodes_publish_of_their_own_is_not_offered(
+    node: Node, probe: Probe
+) -> None:
+    """Two identifiers fly; the IMU of the second is silent. Remapped to the first's it would learn that aircraft."""
+    subscription = node.create_subscription(Imu, "/second/imu", ignored, BEST_EFFORT)
+    other = rclpy.create_node(node.get_name(), namespace="/first", start_parameter_services=False)
+    published = [other.create_publisher(Imu, name, 1) for name in ("imu", "~/imu", "actuators/excitation", "spare")]
+    heard = other.create_subscription(Imu, "imu", ignored, BEST_EFFORT)
+    words = ": nobody publishes it, but sensor_msgs/msg/Imu is published on /first/spare, /imu/data: remap it?"  # the probe's
+    probe.until(lambda: why_silent(node, subscription) == words)
+    assert len(published) == 4
+    assert heard is not None
+    other.destroy_node()
+
+
 def test_another_type_is_named(node: Node, probe: Probe) -> None:
     subscription = node.create_subscription(Imu, "typed", ignored, BEST_EFFORT)
     elsewhere = rclpy.Context()  # one participant cannot have two types of a topic
