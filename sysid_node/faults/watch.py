@@ -108,7 +108,10 @@ def on_estimates(watch: MessageWatch, known: IdentifierEstimates) -> None:
 
 
 def present_faults(watch: MessageWatch, now: float) -> list[Fault]:
-    """All faults at a time (s, by the arrivals' clock). While a topic is silent, none is found by forces."""
+    """All faults at a time (s, by the arrivals' clock).
+
+    One that was found by the forces stands while a topic is silent: nothing contradicts it then.
+    """
     silent = [
         Fault(
             SILENT,
@@ -124,7 +127,7 @@ def present_faults(watch: MessageWatch, now: float) -> list[Fault]:
         for arrived, since in [watch.heard.get(topic, (math.inf, 0.0))]
         if now - arrived > watch.stale_after
     ]
-    forces = [watch.state.fault] if watch.state.fault and not silent else []
+    forces = [watch.state.fault] if watch.state.fault else []
     slower = {fault.part for fault in forces if fault.kind == SLOWER}
     estimated = [fault for fault in watch.servo_times.faults if fault.part not in slower]
     return [*silent, *watch.off_command, *estimated, *watch.limits.faults, *forces]

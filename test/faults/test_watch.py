@@ -9,7 +9,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.faults import watch as watching
 from sysid_node.faults.model.reference_model import IdentifierEstimates, identifier_estimates
 from sysid_node.faults.settings import FaultMonitorSettings
-from sysid_node.faults.types import ARRIVAL, ESTIMATES, FORCES, POSITION, SILENT, SLOWER, STUCK, Fault
+from sysid_node.faults.types import ARRIVAL, ESTIMATES, FORCES, LOSS, POSITION, SILENT, SLOWER, STUCK, Fault
 from sysid_node.faults.watch import Announcements, MessageWatch
 from sysid_node.online.types import DerivativeEstimate
 
@@ -68,6 +68,14 @@ def test_a_silent_topic_is_said_until_it_speaks_again(watch: MessageWatch, topic
 def test_what_never_spoke_is_not_silent(watch: MessageWatch) -> None:
     flown(watch, 0.0, 2.0, silent="air_data")
     assert watching.present_faults(watch, 2.0) == []
+
+
+def test_a_fault_that_was_found_stands_while_a_topic_is_silent(watch: MessageWatch) -> None:
+    """It had vanished, and was announced anew when the topic came back."""
+    flown(watch, 0.0, 2.0)
+    watch.state.fault = Fault(LOSS, "elevator", 0.5, 0.4, 0.6, "", 1.0, 1.5, 1.0)
+    flown(watch, 2.0, 3.0, silent="actuators")
+    assert [fault.kind for fault in watching.present_faults(watch, 3.0)] == [SILENT, LOSS]
 
 
 @pytest.mark.parametrize("stamped", [True, False])

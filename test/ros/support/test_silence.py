@@ -50,7 +50,7 @@ def test_what_another_aircraft_hears_and_what_nodes_publish_of_their_own_is_not_
     other = rclpy.create_node(node.get_name(), namespace="/first", start_parameter_services=False)
     published = [other.create_publisher(Imu, name, 1) for name in ("imu", "~/imu", "actuators/excitation", "spare")]
     heard = other.create_subscription(Imu, "imu", ignored, BEST_EFFORT)
-    words = ": nobody publishes it, but sensor_msgs/msg/Imu is published on /first/spare, /imu/data: remap it?"  # the probe's
+    words = ": nobody publishes it, but sensor_msgs/msg/Imu is published on /first/spare, /imu/data: remap it?"
     probe.until(lambda: why_silent(node, subscription) == words)
     assert len(published) == 4
     assert heard is not None
