@@ -43,14 +43,18 @@ class MeanForce:
 
         A flight shorter than ``AVERAGED`` is not checked.
         """
-        if not self.count or self.end - self.begin < AVERAGED:
-            return
-        mean = self.total / self.count
-        fault = fault_of(mean)
-        if fault and abs(mean) < -_MOST:
+        fault = self.fault
+        if fault and abs(self.total / self.count) < -_MOST:
             warnings.warn(f"{name}: {fault}", InputWarning, stacklevel=2)
         elif fault:
             raise InputError(f"{name}: {fault}")
+
+    @property
+    def fault(self) -> str:
+        """What is wrong with it, in words; empty where nothing is."""
+        if not self.count or self.end - self.begin < AVERAGED:
+            return ""
+        return fault_of(self.total / self.count)
 
 
 @dataclass
@@ -92,9 +96,14 @@ def fault_of(mean: float) -> str:
     return f"mean specific force along z (down) is {mean:.2f} m/s^2, and of a flight about -9.8: {cause}?"
 
 
-def checked_force(record: FlightRecord) -> FlightRecord:
-    """The record as it is, its mean specific force checked. Raises and warns as ``MeanForce.check``."""
+def mean_force(record: FlightRecord) -> MeanForce:
+    """The mean over a whole flight."""
     force = MeanForce()
     force.add(record.time, record["az"])
-    force.check(record.name)
+    return force
+
+
+def checked_force(record: FlightRecord) -> FlightRecord:
+    """The record as it is, its mean specific force checked. Raises and warns as ``MeanForce.check``."""
+    mean_force(record).check(record.name)
     return record

@@ -16,6 +16,7 @@ import numpy as np
 
 from sysid_node.errors import InputError, InputWarning
 from sysid_node.flight.live.kinematic_relations import RELATIONS, Agreement, KinematicRelations
+from sysid_node.flight.live.mean_force import mean_force
 from sysid_node.flight.record import Array, FlightRecord
 
 _CERTAIN = 6.0  # standard deviations from zero from which on the sign of a correlation is certain
@@ -99,11 +100,15 @@ class ReadingSigns:
             and (name == "alpha" or _follows(found["roll"]))  # the side force holds the weight, by the bank
         )
 
-    def check(self, name: str) -> None:
-        """Raise InputError where readings contradict the rest; warn (InputWarning) where only the attitude does."""
+    def check(self, name: str, force_fault: str = "") -> None:
+        """Raise InputError where readings contradict the rest; warn (InputWarning) where only the attitude does.
+
+        ``force_fault``: what is wrong with the mean specific force (``mean_force``). Accelerations in g contradict the
+        airspeed, too, so that it is said instead.
+        """
         fault, doubt = self.contradictions
         if fault:
-            raise InputError(f"{name}: {fault}")
+            raise InputError(f"{name}: {force_fault or fault}")
         if doubt:
             warnings.warn(f"{name}: {doubt}", InputWarning, stacklevel=2)
 
@@ -216,5 +221,5 @@ def checked_signs(record: FlightRecord, *, opposite_alpha: bool = False) -> Flig
         for names in (("ax", "ay", "az", "p", "q", "r"), ("V", "alpha", "beta"), ("phi", "theta", "psi"))
     )
     signs.add(record.time, motion, air, attitude)
-    signs.check(record.name)
+    signs.check(record.name, mean_force(record).fault)
     return record

@@ -41,7 +41,7 @@ class FlightChecks:
         """Raise InputError, or warn (InputWarning), where something does not go together. Name the flight."""
         self._force.check(name)
         self._signs.opposite_alpha = self._lift.opposite_alpha
-        self._signs.check(name)
+        self._signs.check(name, self._force.fault)
         self._lift.check(name)
         self._deflections.check(name)
 

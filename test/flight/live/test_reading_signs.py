@@ -84,6 +84,13 @@ def test_bundled_flights_with_air_data_late_or_early_are_taken(bag: str, late: f
         checked_signs(changed(flight, **shifted))
 
 
+def test_accelerations_in_g_are_not_taken_for_an_airspeed_in_another_unit() -> None:
+    flight = load_flight_record(ROOT / "bags" / "cdrw_near_stall", load_aircraft("cdrw"))
+    in_g = changed(flight, **{name: flight[name] / 9.80665 for name in ("ax", "ay", "az")})
+    with pytest.raises(InputError, match=r"mean specific force along z .* it is in g \(multiply by 9\.80665\)"):
+        checked_signs(in_g)
+
+
 def test_an_angle_of_attack_that_the_lift_contradicts_too_is_told_sooner() -> None:
     """In gusts the kinematics alone leave it open."""
     flight = load_flight_record(ROOT / "bags" / "cdfp_random", load_aircraft("cdfp"))
