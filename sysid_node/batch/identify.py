@@ -29,7 +29,7 @@ from sysid_node.batch.results.response import ModelResponse
 from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings
 from sysid_node.batch.systematic.flight_posterior import FlightPosterior, flight_posterior
-from sysid_node.batch.systematic.gust_bias import with_gust_bias
+from sysid_node.batch.systematic.gust_bias import with_gust_bias, with_unconfirmed_named
 from sysid_node.batch.systematic.online_passes import OnlineEstimate, online_estimates, online_passes
 from sysid_node.batch.systematic.sensitivities import LikelihoodResponse, RegressionResponse, Response
 from sysid_node.batch.systematic.stated_errors import without_stated_errors
@@ -193,7 +193,9 @@ def _with_other_errors(
             flights.online,
             models_gusts=models_gusts,
         )
-    return fit if models_gusts else with_gust_bias(fit, flights.online, np.zeros(len(fit.estimates)))
+    if models_gusts:
+        return with_unconfirmed_named(fit, flights.online)
+    return with_gust_bias(fit, flights.online, np.zeros(len(fit.estimates)))
 
 
 def refuse_unused(method: str, settings: Mapping[str, object]) -> None:

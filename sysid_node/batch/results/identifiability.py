@@ -83,4 +83,7 @@ def identifiability_remarks(covariance: Array, names: Sequence[str], groups: Uni
         for group in groups
     ]
     pairs = inseparable_pairs(covariance[np.ix_(kept, kept)], [names[i] for i in kept])
-    return remarks + [f"{a} and {b} cannot be told apart here (correlation {value:+.3f})" for a, b, value in pairs]
+    return remarks + [
+        f"{a} and {b} are hard to tell apart here (correlation {value:+.3f}); their intervals hold that"
+        for a, b, value in pairs
+    ]

@@ -50,6 +50,26 @@ def with_gust_bias(fit: BatchFit, online: Mapping[str, OnlineEstimate], moved: A
     )
 
 
+def with_unconfirmed_named(fit: BatchFit, online: Mapping[str, OnlineEstimate]) -> BatchFit:
+    """The ``fit`` of a method that estimates the motion of the air, with a remark on what nothing else confirms.
+
+    It takes for gusts whatever the model lacks. In a flight near the stall in still air, its ``Cm_q`` was 14 standard
+    errors off; gusts and a missing effect cannot be told apart by its residuals.
+    """
+    names = [
+        name
+        for name, estimate in fit.estimates.items()
+        if estimate.valid and name in online and not online[name].valid and online[name].gusts > SAID
+    ]
+    if not names:
+        return fit
+    remark = (
+        f"{fit.method} takes for gusts whatever the model lacks, such as a stall; the online estimator, which does "
+        f"not, leaves {', '.join(names)} open: believe these only of a flight in gusts that keeps away from the stall"
+    )
+    return replace(fit, remarks=(*fit.remarks, remark))
+
+
 def unless_contradicted(estimate: ParameterEstimate, online: OnlineEstimate | None) -> ParameterEstimate:
     """The estimate, not valid where a valid one of the online estimator contradicts it.
 

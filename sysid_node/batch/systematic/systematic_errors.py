@@ -25,7 +25,7 @@ from sysid_node.batch.results.batch_fit import BatchFit, SystematicPart
 from sysid_node.batch.results.estimate import ParameterEstimate, confidence_interval
 from sysid_node.batch.systematic.clocks import LATE_COLUMNS, corrected, is_timing
 from sysid_node.batch.systematic.flight_posterior import FlightPosterior, Imperfection
-from sysid_node.batch.systematic.gust_bias import unless_contradicted, with_gust_bias
+from sysid_node.batch.systematic.gust_bias import unless_contradicted, with_gust_bias, with_unconfirmed_named
 from sysid_node.batch.systematic.online_passes import OnlineEstimate
 from sysid_node.batch.systematic.perturbations import perturbed
 from sysid_node.batch.systematic.sensitivities import RegressionResponse, Response
@@ -62,8 +62,7 @@ def with_systematic_errors(
     G = _jacobian(aircraft, records, names, posterior, response)
     others = np.array([not is_timing(one) for one in posterior.imperfections])
     moved = ((posterior.mean - _taken_into_account(aircraft, posterior)) * others) @ G
-    if not models_gusts:
-        fit = with_gust_bias(fit, online, moved)
+    fit = with_unconfirmed_named(fit, online) if models_gusts else with_gust_bias(fit, online, moved)
     systematic = G.T @ posterior.covariance @ G
     errors = np.sqrt(np.maximum(np.diag(systematic), 0.0))
     estimates = {

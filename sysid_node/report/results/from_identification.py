@@ -167,4 +167,5 @@ def _rejected(records: Sequence[FlightRecord]) -> dict[str, int]:
 
 
 def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"
+    named = text.split(maxsplit=1)[0].endswith(":")  # a flight's name, which is left as it is
+    return f"{text[0] if named else text[0].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"

@@ -213,7 +213,7 @@ def test_two_names_for_one_effect_cannot_be_told_apart():
 def test_hardly_separable_parameters_are_named(flights):
     case = hfb_320(flights)
     fit = output_error(case.model, [case.manoeuvre])
-    assert any(remark.startswith("CL_0 and CL_V cannot be told apart here") for remark in fit.remarks)
+    assert any(remark.startswith("CL_0 and CL_V are hard to tell apart here") for remark in fit.remarks)
 
 
 # -- what cannot be done ----------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.batch.identify import identify
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.settings import BatchSettings
-from sysid_node.batch.systematic.gust_bias import with_gust_bias
+from sysid_node.batch.systematic.gust_bias import with_gust_bias, with_unconfirmed_named
 from sysid_node.batch.systematic.online_passes import OnlineEstimate
 from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.excite.spec import parse_manoeuvre
@@ -47,6 +47,21 @@ def in_moderate_turbulence(seed: int) -> FlightRecord:
 @pytest.fixture(scope="module")
 def fit():
     return equation_error(KESTREL, [flight(1)])
+
+
+def test_what_a_method_that_models_gusts_knows_alone_is_named(fit):
+    """The online estimator knows all but two; of one of these nothing but noise is left."""
+    online = {
+        name: OnlineEstimate(e.value, e.standard_error, e.standard_error, "ok", 0.5)
+        for name, e in fit.estimates.items()
+    }
+    online |= {name: online[name]._replace(status="converging") for name in ("Cm_q", "Cl_p")}
+    online["Cl_p"] = online["Cl_p"]._replace(gusts=0.0)
+    found = with_unconfirmed_named(fit, online)
+    assert found.estimates == fit.estimates
+    (remark,) = set(found.remarks) - set(fit.remarks)
+    assert "leaves Cm_q open" in remark
+    assert with_unconfirmed_named(fit, {**online, "Cm_q": online["Cm_q"]._replace(status="ok")}) is fit
 
 
 @pytest.mark.parametrize("bias", [0.0, 1.0, 2.2, 2.6, 3.0, 5.0])
