@@ -17,6 +17,7 @@ import numpy as np
 
 from sysid_node.csv_table import write_table
 from sysid_node.errors import InputError
+from sysid_node.flight import checks
 from sysid_node.flight.csv_checks import check_names, check_time, implausible
 from sysid_node.flight.record import COLUMNS, Array, FlightRecord
 
@@ -72,7 +73,7 @@ def _in_order(table: Array, at: int) -> tuple[Array, dict[str, int]]:
             f"samples {np.count_nonzero(~later)} do not increase; sort the lines by time, or make two flights of it"
         )
     twice = int(np.count_nonzero(time[~later] == latest[~later]))
-    counts = {"time stamp twice": twice, "time goes back": int(np.count_nonzero(~later)) - twice}
+    counts = {checks.DUPLICATE: twice, checks.OUT_OF_ORDER: int(np.count_nonzero(~later)) - twice}
     return table[later], {reason: count for reason, count in counts.items() if count}
 
 

@@ -64,7 +64,7 @@ def test_the_few_samples_whose_time_does_not_increase_are_left_out_and_counted(t
         read_csv(file_with(tmp_path, head + "\n".join(f"{row}{',1' * 8}" for row in each) + "\n"))
         for each in (rows, wrong)
     ]
-    assert flights[1].rejected == {"time stamp twice": 1, "time goes back": 1}
+    assert flights[1].rejected == {"duplicate stamp": 1, "out of order": 1}
     np.testing.assert_array_equal(flights[1].time, flights[0].time)
     np.testing.assert_array_equal(flights[1]["ax"], flights[0]["ax"])
 
