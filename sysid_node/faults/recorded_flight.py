@@ -69,7 +69,9 @@ class FaultVerdict:
         if self.episodes:
             return [episode.text for episode in self.episodes]
         if not self.judged:
-            return ["no faults were looked for: the flight is too short to learn what sound flight is like"]
+            return [
+                "no faults were looked for: the flight is too short to learn what sound flight is like, or has gaps"
+            ]
         return [f"nothing that failed was found in the {self.judged:.0f} s that were judged"]
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from sysid_node.flight.checks import CLOCK_STEP
 from sysid_node.flight.live.monitor import TopicMonitor
 
 WINDOW = 10.0  # s
@@ -29,8 +30,8 @@ class RecentTopic(NamedTuple):
 
     @property
     def troubled(self) -> bool:
-        """Whether so many were rejected that something is wrong."""
-        return self.share > FEW and sum(self.rejected.values()) > STRAY
+        """Whether so many were rejected that something is wrong, or the clock was set."""
+        return CLOCK_STEP in self.rejected or (self.share > FEW and sum(self.rejected.values()) > STRAY)
 
     @property
     def most(self) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from sysid_node.flight.checks import gap
+from sysid_node.flight.checks import CLOCK_STEP, gap
 from sysid_node.flight.live.monitor import Durations, TopicMonitor
 from sysid_node.flight.live.recent_counts import ALL, RecentTopic
 from sysid_node.online.types import Estimates
@@ -151,7 +151,9 @@ def rejections(
 
 
 def _remedy(reason: str, resolved: Mapping[str, str], max_gap: float, parameter: str) -> str:
-    """What to do where messages are left out for gaps in another topic; empty where they are for something else."""
+    """What to do where messages are left out for gaps in another topic, or for a clock that was set; else empty."""
+    if reason == CLOCK_STEP:
+        return ": was the clock set, or did a recording begin anew? The record goes on after a break"
     other = next((name for topic, name in resolved.items() if reason == gap(topic)), "")
     if not other or not max_gap:
         return ""

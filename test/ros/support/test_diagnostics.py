@@ -65,6 +65,13 @@ def test_the_first_messages_without_neighbours_in_other_topics_are_no_trouble(re
     assert SOURCE.input([imu], rejected, 60.0, RecentCounts().update([imu], rejected)).level == OK
 
 
+def test_a_clock_that_was_set_is_said_although_it_costs_one_message() -> None:
+    imu, rejected = heard("imu/data", 2000), {"imu/data: clock step": 1}
+    status = SOURCE.input([imu], rejected, 60.0, RecentCounts().update([imu], rejected))
+    assert status.level == WARN
+    assert "was the clock set, or did a recording begin anew? The record goes on after a break" in status.message
+
+
 def test_what_was_rejected_at_the_start_is_forgotten_after_ten_seconds() -> None:
     now = [0.0]
     imu, recent, levels = TopicMonitor("imu/data"), RecentCounts(lambda: now[0]), []
