@@ -44,7 +44,7 @@ from sysid_node.ros.support.diagnostics import DiagnosticSource, lag_level, lag_
 from sysid_node.ros.support.lifecycle import CarefulNode
 from sysid_node.ros.support.loop_node import LAST_QOS, SENSOR_QOS, expected_joints, full_name, say, waiting
 from sysid_node.ros.support.message_types import fields_of
-from sysid_node.ros.support.silence import UNHEARD, ClockWatch, joined, several_publishers
+from sysid_node.ros.support.silence import UNHEARD, ClockWatch, joined, namesakes, several_publishers
 from sysid_node.ros.support.spin import run_node, while_ros_is_up
 
 DIAGNOSTICS = 1.0  # s between diagnostics
@@ -247,10 +247,11 @@ class Identifier(CarefulNode):
         recent = self._recent.update(monitors, rejected)
         due = due or (session.now(session.silence) if session.samples else None)
         wrong, doubts = session.faults, session.doubts(due)
-        doubled = [f"{topic}: {text}" for topic, text in several_publishers(self, self._inputs).items()]
-        doubt, readings, max_gap = "; ".join([*doubts.values(), *doubled]), [*wrong.values()], session.settings.max_gap
+        doubled = several_publishers(self, self._inputs) | namesakes(self, [self._derivatives])
+        doubt = "; ".join([*doubts.values(), *(f"{topic}: {text}" for topic, text in doubled.items())])
+        readings, max_gap = [*wrong.values()], session.settings.max_gap
         message.status.append(source.input(monitors, rejected, stale_after, recent, readings, max_gap, doubt))
-        self._warn(session, monitors, recent, wrong | doubts)
+        self._warn(session, monitors, recent, joined(wrong | doubts, doubled))
         if due is None:
             message.status += [source.waits("estimate"), source.waits("computation")]
             return
@@ -278,7 +279,7 @@ class Identifier(CarefulNode):
         recent: Sequence[RecentTopic],
         wrong: Mapping[str, str],
     ) -> None:
-        """Say in the log which inputs are silent, rejected, late or ``wrong``."""
+        """Say in the log which inputs are silent, rejected, late or ``wrong``, and what else is."""
         present = self._clock_watch.missing() | {
             monitor.resolved: waiting(self, monitor, subscription)
             for monitor, subscription in zip(monitors, self._inputs, strict=True)
@@ -290,10 +291,10 @@ class Identifier(CarefulNode):
         missing = [joint for joint in joints if joint not in self._joints]
         if missing and here in present and self._joints:
             present[here] += f"; expected joints {', '.join(joints)}, got {', '.join(self._joints)}"
-        present |= wrong
+        present = joined(present, wrong)
         if session.samples and lag_level(self._lag) != DiagnosticStatus.OK:
             present["estimates"] = lag_words(self._lag)
-        say(self, self._conditions.update(joined(present, several_publishers(self, self._inputs))))
+        say(self, self._conditions.update(present))
 
 
 def main() -> None:

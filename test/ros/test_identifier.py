@@ -182,6 +182,17 @@ def test_a_second_publisher_of_an_input_is_said(probe: Probe) -> None:
 
 
 @pytest.mark.slow
+def test_a_second_identifier_of_the_same_name_is_said(probe: Probe) -> None:
+    said: list[str] = []
+    words = "/identifier/derivatives: 2 nodes publish it, and estimates of all come mixed"
+    with ended(start_identifier(), said), ended(start_identifier()):
+        probe.until(lambda: words in getattr(probe.diagnostics.get("identifier: input"), "message", ""))
+        probe.until(lambda: probe.node.count_publishers("/identifier/derivatives") == 2)
+        probe.spin(1.5)
+    assert words in said[0]
+
+
+@pytest.mark.slow
 def test_wrong_joints_are_said_with_what_was_expected_and_what_came(probe: Probe) -> None:
     """In a namespace: its names carry it, on /diagnostics and in the log."""
     process = start_identifier(namespace="/uav1")

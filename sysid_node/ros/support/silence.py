@@ -44,6 +44,13 @@ def several_publishers(node: Node, subscriptions: Iterable[Any]) -> dict[str, st
     return {topic: f"{count} {words}" for topic, count in counts.items() if count > 1}
 
 
+def namesakes(node: Node, publishers: Iterable[Any]) -> dict[str, str]:
+    """By topic, that other nodes publish it as well, of the topics of this node's own ``publishers``."""
+    counts = {one.topic_name: node.count_publishers(one.topic_name) for one in publishers}
+    words = "nodes publish it, and estimates of all come mixed: stop all but one, or give each a namespace"
+    return {topic: f"{count} {words}" for topic, count in counts.items() if count > 1}
+
+
 def joined(first: Mapping[str, str], second: Mapping[str, str]) -> dict[str, str]:
     """By topic, what either says of it, or both."""
     both = {topic: f"{first[topic]}; {text}" if topic in first else text for topic, text in second.items()}
