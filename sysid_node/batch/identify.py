@@ -11,7 +11,6 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.aircraft.stated_effects import as_estimated, not_taken_in_words, with_places_from_cg
 from sysid_node.batch.data_compatibility import check_sensors, corrected
-from sysid_node.batch.dead_sensors import without_dead_sensors
 from sysid_node.batch.methods.constrained_least_squares import FORGETTING, WINDOW, constrained_least_squares
 from sysid_node.batch.methods.equation_error import equation_error
 from sysid_node.batch.methods.error_filtering import error_filtering
@@ -28,6 +27,7 @@ from sysid_node.batch.results.batch_fit import BatchFit
 from sysid_node.batch.results.response import ModelResponse
 from sysid_node.batch.results.validation import figures_of_merit
 from sysid_node.batch.settings import BatchSettings
+from sysid_node.batch.systematic.dead_sensors import without_dead_sensors
 from sysid_node.batch.systematic.flight_posterior import FlightPosterior, flight_posterior
 from sysid_node.batch.systematic.gust_bias import with_gust_bias, with_unconfirmed_named
 from sysid_node.batch.systematic.online_passes import OnlineEstimate, online_estimates, online_passes

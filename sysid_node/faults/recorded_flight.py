@@ -70,7 +70,7 @@ class FaultVerdict:
             return [episode.text for episode in self.episodes]
         if not self.judged:
             return [
-                "no faults were looked for: the flight is too short to learn what sound flight is like, or has gaps"
+                "no faults were looked for: the flight is too short, or has too many gaps, to learn sound flight from"
             ]
         return [f"nothing that failed was found in the {self.judged:.0f} s that were judged"]
 

@@ -157,7 +157,7 @@ def test_a_fault_whose_name_changes_is_one_and_two_silences_are_two() -> None:
 def test_a_flight_too_short_to_learn_says_so(flight: Streams) -> None:
     verdict = judge(AIRCRAFT, FaultMonitorSettings(), shortened(flight, 0.0, 6.0))
     assert (verdict.judged, verdict.episodes) == (0.0, [])
-    assert "too short, or has too many gaps," in verdict.sentences[0]
+    assert "too short, or has too many gaps, to learn" in verdict.sentences[0]
 
 
 def test_a_jump_of_the_recorders_clock_from_1970_to_today_takes_no_time(flight: Streams) -> None:

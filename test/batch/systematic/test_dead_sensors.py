@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from made_flight import KESTREL, flight
 
-from sysid_node.batch.dead_sensors import without_dead_sensors
 from sysid_node.batch.methods.equation_error import equation_error
+from sysid_node.batch.systematic.dead_sensors import without_dead_sensors
 from sysid_node.flight.record import FlightRecord
 
 FLIGHT = flight(1)
