@@ -24,21 +24,31 @@ _FORCES = ("CL", "CY")
 _MOMENTS = {"Cl": ("rolling", "Ixx"), "Cm": ("pitching", "Iyy"), "Cn": ("yawing", "Izz")}
 
 
-class _Estimate(Protocol):
+class Estimated(Protocol):
+    """What is asked of an estimate."""
+
     @property
-    def value(self) -> float: ...
+    def value(self) -> float:
+        """The estimate, in the derivative's unit."""
+        ...
+
     @property
-    def standard_error(self) -> float: ...
+    def standard_error(self) -> float:
+        """Its standard error, in the same unit."""
+        ...
+
     @property
-    def valid(self) -> bool: ...
+    def valid(self) -> bool:
+        """Whether it may be used."""
+        ...
 
 
-def common_factors(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
+def common_factors(aircraft: Aircraft, estimates: Mapping[str, Estimated]) -> list[str]:
     """What valid estimates show of mass, inertias, areas and units, a sentence each; none where nothing is wrong."""
     forces = _factor(aircraft, estimates, _FORCES)
     moments = {name: _factor(aircraft, estimates, (name,)) for name in _MOMENTS}
     known = [factor for factor in (forces, *moments.values()) if factor]
-    if forces and len(known) > 1 and len(known) == 1 + sum(map(bool, moments.values())) and _alike(known):
+    if forces and any(moments.values()) and _alike(known):
         return [
             f"derivatives of forces and moments are all {np.mean(known):.2g} times those of {aircraft.name!r}: are the "
             "wing area, the airspeed and the air density right, or is it another aircraft's flight?"
@@ -61,7 +71,7 @@ def common_factors(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> li
     return found
 
 
-def _side_force_in_g(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> bool:
+def _side_force_in_g(aircraft: Aircraft, estimates: Mapping[str, Estimated]) -> bool:
     """Whether all derivatives of the side force that are well known are far smaller than those of the file.
 
     An accelerometer off its place adds to what is read, so that they need not be smaller by exactly 9.8.
@@ -75,13 +85,13 @@ def _side_force_in_g(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> 
     return len(shares) >= _FEWEST - 1 and max(shares) < _FAR_SMALLER
 
 
-def _factor(aircraft: Aircraft, estimates: Mapping[str, _Estimate], coefficients: Sequence[str]) -> float:
+def _factor(aircraft: Aircraft, estimates: Mapping[str, Estimated], coefficients: Sequence[str]) -> float:
     """The factor that all certain derivatives of these coefficients have; 0 where there is none, or it is near one."""
     logs, errors, told = [], [], set[str]()
     for name, estimate in estimates.items():
         coefficient, _, regressor = name.partition("_")
         stated = aircraft.derivatives.get(name)
-        if coefficient not in coefficients or regressor == "0" or not stated or not _certain(estimate):
+        if coefficient not in coefficients or regressor == "0" or not (stated and stated.value and certain(estimate)):
             continue
         if estimate.value * stated.value <= 0.0:
             return 0.0
@@ -96,7 +106,8 @@ def _factor(aircraft: Aircraft, estimates: Mapping[str, _Estimate], coefficients
     return math.exp(mean) if agree and abs(mean) > math.log(_LARGEST) else 0.0
 
 
-def _certain(estimate: _Estimate) -> bool:
+def certain(estimate: Estimated) -> bool:
+    """Whether an estimate is valid and its sign certain."""
     return estimate.valid and abs(estimate.value) > _CERTAIN * estimate.standard_error
 
 

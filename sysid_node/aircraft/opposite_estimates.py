@@ -7,33 +7,22 @@ that are the limit in rad times those of the file. Nothing else in a flight show
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
 
-from sysid_node.aircraft.common_factors import common_factors
+from sysid_node.aircraft.common_factors import Estimated, certain, common_factors
 from sysid_node.aircraft.model import Aircraft, Control
 
 _MOMENTS = ("Cl", "Cm", "Cn")
-_CERTAIN = 5.0  # standard errors from zero beyond which a sign is certain
 _ALIKE = 0.25  # share within which a factor is the limit in rad
 _FEWEST = 2  # controls that must show it: one alone may have lost a part of its effect
 
 
-class _Estimate(Protocol):
-    @property
-    def value(self) -> float: ...
-    @property
-    def standard_error(self) -> float: ...
-    @property
-    def valid(self) -> bool: ...
-
-
-def opposite_estimates(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
+def opposite_estimates(aircraft: Aircraft, estimates: Mapping[str, Estimated]) -> list[str]:
     """What valid estimates show, a sentence each; none where nothing is wrong."""
     found = [*reversed_controls(aircraft, estimates), *other_readings(aircraft, estimates)]
     return found or common_factors(aircraft, estimates)
 
 
-def reversed_controls(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
+def reversed_controls(aircraft: Aircraft, estimates: Mapping[str, Estimated]) -> list[str]:
     """Controls that are counted the other way, a sentence each."""
     return [
         f"{name} is {estimates[name].value:.3g}, and of the other sign in the aircraft file: is {control} counted the "
@@ -43,16 +32,16 @@ def reversed_controls(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) ->
     ]
 
 
-def other_readings(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
+def other_readings(aircraft: Aircraft, estimates: Mapping[str, Estimated]) -> list[str]:
     """Positions from -1 to 1, and a side force of the wrong sign, a sentence each."""
     found = _positions_as_shares(aircraft, estimates)
     side = estimates.get("CY_beta")
-    if side is not None and _certain(side) and side.value > 0.0:
+    if side is not None and certain(side) and side.value > 0.0:
         found.append(f"CY_beta is {side.value:.3g}, and negative for aircraft: is the sign of ay right?")
     return found
 
 
-def _positions_as_shares(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> list[str]:
+def _positions_as_shares(aircraft: Aircraft, estimates: Mapping[str, Estimated]) -> list[str]:
     """The sentence that is said where derivatives by all controls are as of positions from -1 to 1."""
     factors = {control: factor for control, (_, factor) in _factors(aircraft, estimates).items()}
     limits = {name: aircraft.controls[name].limit for name in factors}
@@ -67,13 +56,13 @@ def _positions_as_shares(aircraft: Aircraft, estimates: Mapping[str, _Estimate])
     ]
 
 
-def _factors(aircraft: Aircraft, estimates: Mapping[str, _Estimate]) -> dict[str, tuple[str, float]]:
+def _factors(aircraft: Aircraft, estimates: Mapping[str, Estimated]) -> dict[str, tuple[str, float]]:
     """By control its strongest derivative, where its sign is certain, and the estimate by the value of the file."""
     strongest = {control.name: _strongest_moment(aircraft, control) for control in aircraft.controls.values()}
     return {
         control: (name, estimates[name].value / aircraft.derivatives[name].value)
         for control, name in strongest.items()
-        if _certain(estimates.get(name))
+        if name in estimates and certain(estimates[name])
     }
 
 
@@ -82,8 +71,3 @@ def _strongest_moment(aircraft: Aircraft, control: Control) -> str:
     names = [f"{moment}_{control.symbol}" for moment in _MOMENTS]
     known = [name for name in names if name in aircraft.derivatives and aircraft.derivatives[name].value]
     return max(known, key=lambda name: abs(aircraft.derivatives[name].value), default="")
-
-
-def _certain(estimate: _Estimate | None) -> bool:
-    """Whether an estimate is valid and its sign certain."""
-    return estimate is not None and estimate.valid and abs(estimate.value) > _CERTAIN * estimate.standard_error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -46,6 +47,12 @@ def test_a_wrong_area_is_in_everything() -> None:
     (said,) = common_factors(CDRW, estimates(dict.fromkeys(ALL, 0.5)))
     assert said.startswith("derivatives of forces and moments are all 0.5 times")
     assert "wing area, the airspeed and the air density" in said
+
+
+def test_a_derivative_that_the_file_states_as_zero_tells_nothing() -> None:
+    named = {**CDRW.derivatives, "CL_de": replace(CDRW.derivatives["CL_de"], value=0.0)}
+    (said,) = common_factors(replace(CDRW, derivatives=named), estimates(dict.fromkeys(("CL_", "CD_", "CY_"), 2.0)))
+    assert "is its mass" in said
 
 
 def test_a_lateral_acceleration_in_g_is_in_the_side_force_alone() -> None:

@@ -84,6 +84,6 @@ def identifiability_remarks(covariance: Array, names: Sequence[str], groups: Uni
     ]
     pairs = inseparable_pairs(covariance[np.ix_(kept, kept)], [names[i] for i in kept])
     return remarks + [
-        f"{a} and {b} are hard to tell apart here (correlation {value:+.3f}); their intervals hold that"
+        f"{a} and {b} are hard to tell apart here (correlation {value:+.3f}); their intervals allow for it"
         for a, b, value in pairs
     ]

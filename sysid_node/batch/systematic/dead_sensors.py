@@ -1,7 +1,7 @@
 """Estimates from flights in which a sensor was dead.
 
-A reading that stands still fits a model of nothing: its derivatives come out precise and wrong, and so do those of
-whatever moved at the same time. No method's residuals show it.
+Where a reading does not change, the derivatives that are estimated from it are wrong with narrow intervals, and so are
+those of regressors that moved at the same time. The residuals of no method show it.
 """
 
 from __future__ import annotations

@@ -50,5 +50,5 @@ def test_pairs_come_worst_first_with_their_sign():
     assert inseparable_pairs(covariance, NAMES[:3]) == [("b", "c", -0.99), ("a", "b", 0.96)]
     assert identifiability_remarks(covariance, NAMES[:3], (("c",),)) == [
         "nothing here shows c",
-        "a and b are hard to tell apart here (correlation +0.960); their intervals hold that",
+        "a and b are hard to tell apart here (correlation +0.960); their intervals allow for it",
     ]

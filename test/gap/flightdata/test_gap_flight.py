@@ -1,12 +1,16 @@
 """Flights made ready; truth: sines, whose derivatives and amplitudes are known, and what was taken away."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from sysid_node import load
+from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
+from sysid_node.flight.csv import write_csv
 from sysid_node.flight.logs.fractions import between_commands
 from sysid_node.flight.record import FlightRecord
 from sysid_node.gap.flightdata.gap_flight import (
@@ -14,6 +18,7 @@ from sysid_node.gap.flightdata.gap_flight import (
     GapFlight,
     completed_flight,
     flight_of_streams,
+    load_gap_flight,
     resampled,
 )
 from sysid_node.sim import Simulator
@@ -21,6 +26,7 @@ from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import fly_sortie
 from sysid_node.sim.prediction.signals import unfiltered_columns
 
+ROOT = Path(__file__).resolve().parents[3]
 RATE, DURATION = 200.0, 20.0
 NAMES = ("ax", "ay", "az", "p", "q", "r", "V", "alpha", "beta", "rho", "phi", "theta", "psi", "thrust")
 
@@ -135,6 +141,17 @@ def test_a_slow_logs_commands_keep_their_interval_apart_from_the_rate_of_the_lin
     flight = flight_of_streams(replace(streams, actuators=between_commands(streams.actuators)), aircraft)
     assert flight.step_interval == pytest.approx(1.0 / logged, rel=0.02)
     assert flight.actuator_rate > 150.0
+
+
+def test_a_flight_with_a_dead_sensor_is_refused(tmp_path) -> None:
+    """Nothing of the diagnosis could tell it from an effect of the aircraft."""
+    record = load(ROOT / "bags" / "cdrw_multistep", "cdrw").record
+    for name, beta in (("sound", record["beta"]), ("dead", np.full(len(record), 0.01))):
+        write_csv(tmp_path / f"{name}.csv", replace(record, columns={**record.columns, "beta": beta}))
+    known = load_aircraft("cdrw")
+    assert load_gap_flight(tmp_path / "sound.csv", known, None, "flu").lateral
+    with pytest.raises(InputError, match="dead: sideslip: no change for 10 s: a dead sensor"):
+        load_gap_flight(tmp_path / "dead.csv", known, None, "flu")
 
 
 def test_a_flight_that_is_too_short_is_refused(aircraft, time) -> None:
