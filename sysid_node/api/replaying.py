@@ -22,7 +22,13 @@ from sysid_node.faults.model.reference_model import identifier_estimates
 from sysid_node.faults.recorded_flight import FaultVerdict, RecordedEstimates, RecordedMonitor
 from sysid_node.faults.settings import FaultMonitorSettings as FaultSettings
 from sysid_node.flight.actuation import Actuation
-from sysid_node.flight.align import counts_by_reason, joined_spans, stamp_spans, why_nothing_aligned
+from sysid_node.flight.align import (
+    counts_by_reason,
+    joined_spans,
+    stamp_spans,
+    warn_without_density,
+    why_nothing_aligned,
+)
 from sysid_node.flight.commanded import carried_in_words
 from sysid_node.flight.logs.opening import carried_by
 from sysid_node.flight.pieces import PIECE, FlightPiece, FlightPieces, flight_pieces
@@ -193,6 +199,7 @@ class _Run:
         self.joints: tuple[str, ...] = ()
         self.commands_from, self.frame_id = math.inf, ""
         self.began = math.inf  # s
+        self.density = np.empty(0)  # kg/m^3, the first that was measured; without it NaN
         self.done = 0  # messages
 
     def take(self, piece: FlightPiece) -> None:
@@ -203,6 +210,9 @@ class _Run:
             self.alignment = PieceAlignment(self.aircraft, self.settings.max_gap, carried)
             interval = streams.actuators.interval
             self.state = estimator.init(self.aircraft, self.settings, command_interval=interval)
+        if not np.isfinite(self.density).any():
+            measured = streams.air_data.values[:, 3]
+            self.density = np.append(measured[np.isfinite(measured)], np.nan)[:1]
         self.joints, self.frame_id = streams.actuators.names, streams.imu.frame_id or self.frame_id
         self.spans = joined_spans(self.spans, stamp_spans(streams))
         count = sum(len(stream.arrival) for stream in streams.by_topic.values())
@@ -260,6 +270,7 @@ class _Run:
         inputs = self.state.inputs
         broken = inputs.interruptions.fault(inputs.previous[0], self.settings.max_gap) if inputs.previous else ""
         opposite = opposite_estimates(self.aircraft, final.derivatives)
+        warn_without_density(self.aircraft, self.density, self.flight.name)
         for wrong in filter(None, (inputs.unchanging.fault, broken, *opposite)):
             warnings.warn(f"{self.flight.name}: {wrong}", InputWarning, stacklevel=2)
         seconds = last - self.began

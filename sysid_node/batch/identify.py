@@ -19,6 +19,8 @@ from sysid_node.batch.methods.joint_estimation import KALMAN_FILTERS, JointEstim
 from sysid_node.batch.methods.maximum_likelihood_estimation import MaximumLikelihoodEstimation
 from sysid_node.batch.methods.neural_gauss_newton import neural_gauss_newton
 from sysid_node.batch.methods.recursive_least_squares import recursive_least_squares
+from sysid_node.batch.models.rigid_body import STATES
+from sysid_node.batch.models.stretches import stretches
 from sysid_node.batch.regression.filtering import lowpass
 from sysid_node.batch.regression.measured_coefficients import measured_coefficients
 from sysid_node.batch.regression.regressors import regressor_matrix
@@ -101,7 +103,9 @@ def identify(
         raise InputError(f"method {method!r}: expected one of {', '.join(METHODS)}")
     if not records:
         raise InputError("no flight to identify from; give at least one")
-    flights = _prepared(as_estimated(aircraft), _named(records), _named(holdout), settings)
+    fitted, cut = _in_stretches(method, aircraft, _named(records), settings)
+    checked, _ = _in_stretches(method, aircraft, _named(holdout), settings)
+    flights = _prepared(as_estimated(aircraft), fitted, checked, settings)
     fit, predict = _fitted_with_systematic_errors(method, flights, settings)
     fit = without_dead_sensors(fit, aircraft, records)
     figures: FiguresByFlight = {}
@@ -109,11 +113,25 @@ def identify(
         coefficients = predicted_coefficients(flights.aircraft, fit.values, [record], settings.low_pass)
         figures[record.name] = _figures_of_flight(flights.aircraft, record, [*coefficients, *predict(record)])
     return Identification(
-        replace(fit, remarks=(*flights.remarks, *fit.remarks)),
+        replace(fit, remarks=(*cut, *flights.remarks, *fit.remarks)),
         predicted_coefficients(flights.aircraft, fit.values, flights.records, settings.low_pass),
         figures,
         flights.selections,
     )
+
+
+def _in_stretches(
+    method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings
+) -> tuple[list[FlightRecord], list[str]]:
+    """The flights cut at interruptions, and remarks on it; without the samples that lack what the method integrates.
+
+    Regressions leave out themselves what their equations lack, and output error needs no output at every sample.
+    """
+    needed = [] if method in _REGRESSIONS else [*aircraft.control_symbols, "thrust", "rho"]
+    if method == "filter_error" or method in KALMAN_FILTERS:
+        needed += [*STATES, "ax", "ay", "az"]
+    cut = [stretches(record, needed, settings.max_gap) for record in records]
+    return [part for parts, _ in cut for part in parts], [remark for _, remarks in cut for remark in remarks]
 
 
 @dataclass(frozen=True)

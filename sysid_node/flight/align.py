@@ -11,6 +11,7 @@ IMU messages between neighbours that are more than ``max_gap`` apart are left ou
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.checks import (
     BEYOND,
@@ -228,6 +229,18 @@ def screen_air_data(aircraft: Aircraft, stream: AirDataStream, last: int | None 
     values = stream.values
     density = np.where(np.isnan(values[:, 3]), aircraft.reference.air_density, values[:, 3])
     return screen(stream.arrival, np.column_stack([values[:, :3], density]), air_data_faults(values), last)
+
+
+def warn_without_density(aircraft: Aircraft, density: Array, name: str) -> None:
+    """Warn (InputWarning) where none of a flight's densities (N,) kg/m^3 was measured: the file's counts then."""
+    if density.size and not np.isfinite(density).any():
+        warnings.warn(
+            f"{name}: no air density was recorded; the aircraft file's {aircraft.reference.air_density:.3g} kg/m^3 is "
+            "taken, and all derivatives are off by the factor by which it is off: record it (from pressure and "
+            "temperature), or give reference.air_density the flight's value",
+            InputWarning,
+            stacklevel=2,
+        )
 
 
 def buffer_ns(max_gap: float) -> int:

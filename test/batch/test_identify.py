@@ -113,11 +113,27 @@ def test_a_flight_without_airspeed_is_refused(method, reading):
         identify(method, KESTREL, [blind], QUICK)
 
 
-def test_filter_error_refuses_a_command_that_is_missing_for_a_moment():
+def test_filter_error_refuses_a_command_that_is_missing_most_of_the_time():
     whole = clean()
-    hole = np.where(np.abs(whole.time - 3.0) < 0.1, np.nan, whole["de"])
-    with pytest.raises(InputError, match=r"input de is missing at 2\.9"):
-        identify("filter_error", KESTREL, [dataclasses.replace(whole, columns={**whole.columns, "de": hole})], QUICK)
+    rare = np.where(np.arange(len(whole)) % 10 == 0, whole["de"], np.nan)
+    with pytest.raises(InputError, match="model rigid_body needs de, which it did not measure"):
+        identify("filter_error", KESTREL, [dataclasses.replace(whole, columns={**whole.columns, "de": rare})], QUICK)
+
+
+@pytest.mark.parametrize(
+    "method", ["equation_error", "frequency_equation_error", "output_error", "extended_kalman_filter"]
+)
+def test_an_interrupted_recording_gives_what_a_whole_one_gives(method):
+    whole = flight(1)
+    kept = ~((whole.time > 5.0) & (whole.time < 6.2))  # between the aileron's manoeuvre and the rudder's
+    columns = {name: values[kept] for name, values in whole.columns.items()}
+    interrupted = dataclasses.replace(whole, time=whole.time[kept], columns=columns)
+    fit = identify(method, KESTREL, [interrupted], QUICK).fit
+    assert "the recording is interrupted once; 2 stretches are used" in " ".join(fit.remarks)
+    valid = {name: e for name, e in fit.estimates.items() if e.valid}
+    assert len(valid) > 20
+    assert np.abs(scores(valid)).max() < 5.0
+    assert np.mean(np.abs(scores(valid)) < 2.2) > 0.8
 
 
 @pytest.mark.parametrize("method", METHODS)

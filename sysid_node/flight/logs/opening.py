@@ -8,7 +8,7 @@ from pathlib import Path
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.actuation import joint_names
-from sysid_node.flight.align import MAX_GAP, flight_record
+from sysid_node.flight.align import MAX_GAP, flight_record, warn_without_density
 from sysid_node.flight.autopilots.base import AdapterSettings
 from sysid_node.flight.autopilots.joints import require_known
 from sysid_node.flight.autopilots.recorded_topics import autopilot_of
@@ -124,9 +124,11 @@ def load_flight_record(
     """
     if is_table(path, topics, frame):
         record = _checked(aircraft, read_csv(path))
+        warn_without_density(aircraft, record["rho"], record.name)
         return with_commands(aircraft, record, carried)
     streams = open_streams(path, aircraft, topics, frame)
     record = flight_record(aircraft, streams, max_gap, carried_by(streams, carried))
+    warn_without_density(aircraft, streams.air_data.values[:, 3], record.name)
     return _checked(aircraft, record)
 
 
