@@ -20,7 +20,7 @@ from sysid_node.batch.methods.maximum_likelihood_estimation import MaximumLikeli
 from sysid_node.batch.methods.neural_gauss_newton import neural_gauss_newton
 from sysid_node.batch.methods.recursive_least_squares import recursive_least_squares
 from sysid_node.batch.models.rigid_body import STATES
-from sysid_node.batch.models.stretches import stretches
+from sysid_node.batch.models.stretches import interruptions_in_words, stretches
 from sysid_node.batch.regression.filtering import lowpass
 from sysid_node.batch.regression.measured_coefficients import measured_coefficients
 from sysid_node.batch.regression.regressors import regressor_matrix
@@ -103,9 +103,7 @@ def identify(
         raise InputError(f"method {method!r}: expected one of {', '.join(METHODS)}")
     if not records:
         raise InputError("no flight to identify from; give at least one")
-    fitted, cut = _in_stretches(method, aircraft, _named(records), settings)
-    checked, _ = _in_stretches(method, aircraft, _named(holdout), settings)
-    flights = _prepared(as_estimated(aircraft), fitted, checked, settings)
+    flights = _prepared(method, as_estimated(aircraft), _named(records), _named(holdout), settings)
     fit, predict = _fitted_with_systematic_errors(method, flights, settings)
     fit = without_dead_sensors(fit, aircraft, records)
     figures: FiguresByFlight = {}
@@ -113,7 +111,7 @@ def identify(
         coefficients = predicted_coefficients(flights.aircraft, fit.values, [record], settings.low_pass)
         figures[record.name] = _figures_of_flight(flights.aircraft, record, [*coefficients, *predict(record)])
     return Identification(
-        replace(fit, remarks=(*cut, *flights.remarks, *fit.remarks)),
+        replace(fit, remarks=(*flights.remarks, *fit.remarks)),
         predicted_coefficients(flights.aircraft, fit.values, flights.records, settings.low_pass),
         figures,
         flights.selections,
@@ -123,12 +121,16 @@ def identify(
 def _in_stretches(
     method: str, aircraft: Aircraft, records: Sequence[FlightRecord], settings: BatchSettings
 ) -> tuple[list[FlightRecord], list[str]]:
-    """The flights cut at interruptions, and remarks on it; without the samples that lack what the method integrates.
+    """The flights cut at interruptions where the ``method`` integrates, and remarks on it.
 
-    Regressions leave out themselves what their equations lack, and output error needs no output at every sample.
+    Samples that lack what it needs are left out. Regressions need no cut, and leave out such samples themselves; output
+    error needs no output at every sample.
     """
-    needed = [] if method in _REGRESSIONS else [*aircraft.control_symbols, "thrust", "rho"]
-    if method == "filter_error" or method in KALMAN_FILTERS:
+    if method in _REGRESSIONS:
+        told = (interruptions_in_words(record, settings.max_gap) for record in records)
+        return list(records), [text for text in told if text]
+    needed = [*aircraft.control_symbols, "thrust", "rho"]
+    if method != "output_error":
         needed += [*STATES, "ax", "ay", "az"]
     cut = [stretches(record, needed, settings.max_gap) for record in records]
     return [part for parts, _ in cut for part in parts], [remark for _, remarks in cut for remark in remarks]
@@ -139,8 +141,8 @@ class _PreparedFlights:
     """Flights with sensors and clocks corrected, and the derivatives that are to be estimated from them."""
 
     aircraft: Aircraft
-    recorded: Sequence[FlightRecord]  # with corrected sensors, clocks as recorded
-    records: Sequence[FlightRecord]  # with corrected clocks
+    recorded: Sequence[FlightRecord]  # stretches without interruption, with corrected sensors, clocks as recorded
+    records: Sequence[FlightRecord]  # the same with corrected clocks
     holdout: Sequence[FlightRecord]
     posterior: FlightPosterior | None  # of the imperfections
     online: Mapping[str, OnlineEstimate]
@@ -149,6 +151,7 @@ class _PreparedFlights:
 
 
 def _prepared(
+    method: str,
     aircraft: Aircraft,
     records: Sequence[FlightRecord],
     holdout: Sequence[FlightRecord],
@@ -159,17 +162,19 @@ def _prepared(
     records, holdout = ([without_stated_errors(aircraft, one) for one in some] for some in (records, holdout))
     selections: Mapping[str, StepwiseSelection] = {}
     if settings.correct_sensors:
-        found = check_sensors(aircraft, records, settings.segment or 10.0)
-        records, holdout = found.corrected, [corrected(record, found.fit.values) for record in holdout]
+        found = check_sensors(aircraft, _in_stretches(method, aircraft, records, settings)[0], settings.segment or 10.0)
+        records, holdout = ([corrected(one, found.fit.values) for one in some] for some in (records, holdout))
         remarks += found.remarks
     if settings.stepwise:
         before = aircraft.derivatives
         aircraft, selections = supported_model(aircraft, records, settings.low_pass)
         left_out = [name for name in before if name not in aircraft.derivatives]
         remarks.append(f"stepwise regression left out {', '.join(left_out) or 'nothing'}")
-    passes = online_passes(aircraft, records, settings)
+    passes = online_passes(aircraft, records, settings)  # of whole flights: it stands short interruptions
     posterior = flight_posterior(passes)
-    recorded = records
+    recorded, cut = _in_stretches(method, aircraft, records, settings)
+    records, (holdout, _) = recorded, _in_stretches(method, aircraft, holdout, settings)
+    remarks += cut
     if posterior is not None:
         records, holdout = on_time(aircraft, records, posterior), on_time(aircraft, holdout, posterior)
     elif _uncertain(aircraft):

@@ -129,7 +129,7 @@ def test_an_interrupted_recording_gives_what_a_whole_one_gives(method):
     columns = {name: values[kept] for name, values in whole.columns.items()}
     interrupted = dataclasses.replace(whole, time=whole.time[kept], columns=columns)
     fit = identify(method, KESTREL, [interrupted], QUICK).fit
-    assert "the recording is interrupted once; 2 stretches are used" in " ".join(fit.remarks)
+    assert "the recording is interrupted once, for 1.2 of 12 s in all" in " ".join(fit.remarks)
     valid = {name: e for name, e in fit.estimates.items() if e.valid}
     assert len(valid) > 20
     assert np.abs(scores(valid)).max() < 5.0

@@ -19,6 +19,7 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.batch.regression.combined_fit import combined_fit
 from sysid_node.batch.regression.errors_in_variables import ErrorsInVariables, SensorNoise
+from sysid_node.batch.regression.filtering import pieces
 from sysid_node.batch.regression.linear_regression import Regression, regress
 from sysid_node.batch.regression.measured_coefficients import (
     MeasuredCoefficients,
@@ -103,15 +104,23 @@ def _lines(frequencies: Frequencies, times: Sequence[Array]) -> Array:
 
 
 def _band_passed(time: Array, X: Array, lines: Array) -> Array:
-    """Z (N, p) = Re F^H F X, made orthogonal to a constant and a line."""
-    weight = np.gradient(time)
-    weight[[0, -1]] *= 0.5  # trapezoidal rule at the samples' own times
+    """Z (N, p) = Re F^H F X, made orthogonal to a constant and a line; nothing is integrated over an interruption."""
+    weight = np.concatenate([_trapezoidal(time[part]) for part in pieces(time)])
     fourier = np.exp(-2j * np.pi * np.outer(lines, time - time[0])) * weight
     drift = _drift(time.size)
     both = fourier.conj().T @ (fourier @ np.column_stack([X, drift]))
     passed, passed_drift = both.real[:, : X.shape[1]], both.real[:, X.shape[1] :]
     slopes = np.linalg.lstsq(drift.T @ passed_drift, drift.T @ passed, rcond=None)[0]
     return np.asarray(passed - passed_drift @ slopes)
+
+
+def _trapezoidal(time: Array) -> Array:
+    """Weights (N,) of the trapezoidal rule at the samples' own times, s."""
+    if time.size < 2:
+        return np.zeros(time.size)
+    weight = np.gradient(time)
+    weight[[0, -1]] *= 0.5
+    return weight
 
 
 def _drift(samples: int) -> Array:

@@ -32,33 +32,43 @@ def stretches(record: FlightRecord, needed: Sequence[str], longest: float) -> tu
     which the rest of the flight has, are left out. The time of each begins at zero. A record without interruptions is
     returned as it is; so is one of which no stretch is left.
     """
-    complete = np.all([np.isfinite(record[name]) for name in needed if record.measured(name)] or [True], axis=0)
-    complete = np.broadcast_to(complete, record.time.shape)
+    measured = [name for name in needed if record.measured(name)]
+    complete = np.isfinite(np.array([record.time, *(record[name] for name in measured)])).all(axis=0)
     if 2 * int(complete.sum()) < len(record):
         return [record], []
     whole, remarks = record, []
     if not complete.all():
-        names = [name for name in needed if record.measured(name) and not np.isfinite(record[name]).all()]
+        names = [name for name in measured if not np.isfinite(record[name]).all()]
         missing = f"{int((~complete).sum())} of {len(record)} samples lack a value of {', '.join(names)}"
         remarks.append(f"{record.name}: {missing}, and were left out")
         whole = _at(record, complete, record.name)
     return _cut(whole, longest, remarks)
 
 
-def _cut(record: FlightRecord, longest: float, remarks: list[str]) -> tuple[list[FlightRecord], list[str]]:
+def interruptions_in_words(record: FlightRecord, longest: float) -> str:
+    """How often the recording is interrupted for longer than ``longest`` s, and for how long in all; empty if never."""
+    places = _interruptions(record, longest)
+    if not places.size:
+        return ""
+    often = "once" if places.size == 1 else f"{places.size} times"
+    lost = float(np.diff(record.time)[places].sum())
+    return f"{record.name}: the recording is interrupted {often}, for {lost:.3g} of {record.duration:.3g} s in all"
+
+
+def _interruptions(record: FlightRecord, longest: float) -> NDArray[np.intp]:
+    """The last sample before each interruption."""
     steps = np.diff(record.time)
-    interruptions = np.flatnonzero(steps > max(longest, _USUAL_STEPS * float(np.median(steps))))
-    if not interruptions.size:
-        return [record], remarks
-    edges = [0, *(interruptions + 1).tolist(), len(record)]
+    return np.flatnonzero(steps > max(longest, _USUAL_STEPS * float(np.median(steps))))
+
+
+def _cut(record: FlightRecord, longest: float, remarks: list[str]) -> tuple[list[FlightRecord], list[str]]:
+    edges = [0, *(_interruptions(record, longest) + 1).tolist(), len(record)]
     parts = [slice(first, last) for first, last in pairwise(edges) if _is_usable(record, first, last)]
-    if not parts:
+    if len(edges) == 2 or not parts:
         return [record], remarks
-    lost = record.duration - sum(float(record.time[part][-1] - record.time[part][0]) for part in parts)
-    remarks.append(
-        f"{record.name}: the recording is interrupted {_times(interruptions.size)}; {len(parts)} "
-        f"stretch{'es are' if len(parts) > 1 else ' is'} used, and {lost:.3g} of {record.duration:.3g} s are not"
-    )
+    used = sum(float(record.time[part][-1] - record.time[part][0]) for part in parts)
+    stretches_used = f"{len(parts)} stretches of {used:.3g} s together are" if len(parts) > 1 else f"{used:.3g} s are"
+    remarks.append(f"{interruptions_in_words(record, longest)}; {stretches_used} used")
     names = [f"{record.name} [{k + 1}/{len(parts)}]" for k in range(len(parts))] if len(parts) > 1 else [record.name]
     return [_at(record, part, name) for part, name in zip(parts, names, strict=True)], remarks
 
@@ -79,7 +89,3 @@ def _at(record: FlightRecord, rows: slice | NDArray[np.bool_], name: str) -> Fli
     time = record.time[rows]
     start = record.start_ns + round(1e9 * float(time[0]))
     return replace(record, time=time - time[0], columns=columns, name=name, start_ns=start)
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"

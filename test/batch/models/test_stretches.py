@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_flight import clean
 
-from sysid_node.batch.models.stretches import stretches
+from sysid_node.batch.models.stretches import interruptions_in_words, stretches
 
 CONTROLS = ("de", "da", "dr", "thrust")
 
@@ -38,14 +38,17 @@ def test_a_flight_is_cut_at_an_interruption_and_this_is_said():
     assert [part.time[0] for part in parts] == [0.0, 0.0]
     np.testing.assert_array_equal(parts[1]["q"], record["q"][record.time >= 6.0])
     assert parts[1].start_ns == pytest.approx(record.start_ns + 6e9)
-    assert remarks == ["kestrel +1: the recording is interrupted once; 2 stretches are used, and 2 of 12 s are not"]
+    said = "the recording is interrupted once, for 2 of 12 s in all"
+    assert remarks == [f"kestrel +1: {said}; 2 stretches of 9.99 s together are used"]
+    assert interruptions_in_words(without(record, 4.0, 6.0), 0.2) == f"kestrel +1: {said}"
+    assert interruptions_in_words(record, 0.2) == ""
 
 
 def test_stretches_that_are_short_or_lack_a_signal_are_left_out():
     record = clean()
     parts, remarks = stretches(without(record, 1.0, 2.0), CONTROLS, 0.2)
     assert [part.name for part in parts] == ["kestrel +1"]
-    assert "1 stretch is used, and 2 of 12 s are not" in remarks[0]
+    assert remarks[0].endswith("; 9.99 s are used")
     blind = changed(record, alpha=np.where(record.time < 4.5, np.nan, record["alpha"]))
     assert len(stretches(without(blind, 4.0, 6.0), CONTROLS, 0.2)[0]) == 1
     parked = changed(record, V=np.where(record.time < 4.5, 0.5, record["V"]))

@@ -55,14 +55,6 @@ def test_lowpass_keeps_the_band_undelayed_and_drops_the_rest():
     np.testing.assert_allclose(found[50:-50], slow[50:-50], atol=0.005)
 
 
-def test_lowpass_does_not_reach_across_an_interruption():
-    x = np.random.default_rng(4).normal(size=(TIME.size, 2))
-    later = np.where(np.arange(TIME.size) < TIME.size // 2, TIME, TIME + 5.0)
-    found, half = lowpass(later, x, 5.0), TIME.size // 2
-    np.testing.assert_allclose(found[:half], lowpass(TIME[:half], x[:half], 5.0), atol=1e-5)
-    np.testing.assert_allclose(found[half:], lowpass(TIME[half:], x[half:], 5.0), atol=1e-5)
-
-
 @pytest.mark.parametrize("cutoff", [0.0, 25.0, 1000.0])
 def test_a_cutoff_outside_the_band_changes_nothing(cutoff):
     x = np.random.default_rng(4).normal(size=(500, 2))

@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import json
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -413,6 +414,24 @@ def test_a_reading_that_stands_still_is_warned_of(tmp_path):
     with pytest.warns(InputWarning, match=r"still: sideslip: no change for 10 s.* not measured must be NaN"):
         found = replay(load(tmp_path / "still", "cdrw"), judge_faults=False)
     assert {d.status for d in found.final.derivatives.values()} == {"stale input"}
+
+
+def test_an_air_density_that_was_not_recorded_is_warned_of(tmp_path):
+    """Truth: two flights that differ in nothing else; one density that was measured is enough for no warning."""
+    thin = read_streams(short_bag("cdrw_multistep", 12.0, tmp_path))
+    thin.air_data.values[1:, 3] = np.nan
+    write_streams(tmp_path / "once", thin)
+    thin.air_data.values[0, 3] = np.nan
+    write_streams(tmp_path / "never", thin)
+    said = r"never: no air density was recorded; the aircraft file's 1\.\d+ kg/m\^3 is taken"
+    with pytest.warns(InputWarning, match=said):
+        replay(load(tmp_path / "never", "cdrw"), judge_faults=False)
+    with pytest.warns(InputWarning, match=said):
+        load(tmp_path / "never", "cdrw").aligned(0.2)
+    with warnings.catch_warnings(record=True) as other:
+        replay(load(tmp_path / "once", "cdrw"), judge_faults=False)
+        load(tmp_path / "once", "cdrw").aligned(0.2)
+    assert not [one for one in other if "air density" in str(one.message)]
 
 
 @pytest.mark.slow
