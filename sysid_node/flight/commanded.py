@@ -128,7 +128,8 @@ def carried_in_words(aircraft: Aircraft, setting: str, commanded: bool, late: Se
     if setting == "auto":
         taken = "Actuators are taken as positions: no command jumps that a surface could not follow."
         if late:
-            return f"{taken} But {', '.join(late)} act later than recorded, as after commands: {_STATE}"
+            act = "acts" if len(late) == 1 else "act"
+            return f"{taken} But {', '.join(late)} {act} later than recorded, as after commands: {_STATE}"
         return f"{taken} {_UNSAID}" if aircraft.ideal else taken
     return ""
 

@@ -72,6 +72,7 @@ def test_surfaces_that_act_late_are_said_where_nobody_said_what_is_recorded():
     aircraft, late = load_aircraft("cdrw"), ["elevator", "rudder"]
     said = carried_in_words(aircraft, "auto", commanded=False, late=late)
     assert "elevator, rudder act later than recorded, as after commands" in said
+    assert "But aileron acts later" in carried_in_words(aircraft, "auto", commanded=False, late=["aileron"])
     assert "later than" not in carried_in_words(aircraft, "auto", commanded=True, late=late)
     assert carried_in_words(aircraft, "positions", commanded=False, late=late) == ""
 

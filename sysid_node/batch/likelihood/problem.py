@@ -110,8 +110,8 @@ class LikelihoodProblem(ABC):
                 raise InputError(
                     f"{response.name}: model {self.unknowns.model.name} diverges from its start values: "
                     f"{response.names[column]} is more than a million times the measurement from "
-                    f"{response.time[row]:.2f} s on; start nearer "
-                    "to the aircraft (equation_error finds start values) or cut the flight into shorter manoeuvres"
+                    f"{response.time[row]:.2f} s on; cut the flight into shorter pieces (segment), leave out what the "
+                    "flight does not move (states), or give an aircraft file that is nearer to the aircraft"
                 )
 
 
