@@ -211,6 +211,7 @@ class Identifier(CarefulNode):
         path = save_estimates(
             Path(self.get_parameter("save_directory").value),
             estimates,
+            node=full_name(self),
             aircraft=session.aircraft.name,
             settings=session.settings,
             stamp_ns=stamp_ns,

@@ -19,6 +19,7 @@ def save_estimates(
     folder: Path,
     estimates: Estimates,
     *,
+    node: str,
     aircraft: str,
     settings: OnlineSettings,
     stamp_ns: int,
@@ -27,6 +28,9 @@ def save_estimates(
 ) -> Path:
     """Write ``<aircraft>-<stamp_ns>.json`` into ``folder``, completely or not at all, and return its absolute path.
 
+    ``node`` is the estimator's full name. Its namespace, where it has one, begins the file's name, so that aircraft of
+    one type that fly together keep their files apart (``uav1-cdrw-<stamp_ns>.json`` of ``/uav1/identifier``).
+
     A ``~`` at the beginning of ``folder`` is the user's home: no shell expands it in a parameter.
     Characters of the aircraft's name that could lead out of the folder become underscores in the file's name.
 
@@ -34,6 +38,7 @@ def save_estimates(
     of messages left out by reason. NaN becomes null. Raises InputError where the folder cannot be written.
     """
     content = {
+        "node": node,
         "aircraft": aircraft,
         "method": settings.method,
         "stamp_ns": stamp_ns,
@@ -44,7 +49,8 @@ def save_estimates(
         **_findings(estimates),
     }
     folder = user_path(folder).absolute()
-    path = folder / f"{_file_name(aircraft)}-{stamp_ns}.json"
+    name = "-".join([*node.strip("/").split("/")[:-1], aircraft])
+    path = folder / f"{_file_name(name)}-{stamp_ns}.json"
     partial = path.with_suffix(".part")
     try:
         folder.mkdir(parents=True, exist_ok=True)

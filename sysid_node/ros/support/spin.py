@@ -18,6 +18,7 @@ from rclpy.exceptions import NotInitializedException
 from rclpy.executors import Executor, ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
@@ -75,7 +76,7 @@ def run_program(program: Callable[[], None]) -> int:
         # rclpy's own handlers miss what comes while ROS begins, and shut it down in the middle of ``take_up``.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
-        rclpy.logging.get_logger("sysid").fatal(f"arguments after --ros-args: {' '.join(str(error).split())}")
+        _logger().fatal(f"arguments after --ros-args: {' '.join(str(error).split())}")
         return 2
     stopper = threading.Thread(target=_shut_down_once, args=(told, rclpy.get_default_context().handle))
     stopper.start()
@@ -83,7 +84,7 @@ def run_program(program: Callable[[], None]) -> int:
         with until_shutdown():
             program()
     except InputError as error:
-        rclpy.logging.get_logger("sysid").fatal(str(error))
+        _logger().fatal(str(error))
         return 2
     finally:
         with _staying_up:
@@ -93,6 +94,11 @@ def run_program(program: Callable[[], None]) -> int:
         for one in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C while Python ends would be its exit code
             signal.signal(one, signal.SIG_IGN)
     return 0
+
+
+def _logger() -> RcutilsLogger:
+    """The log of a program that has no node, or none any more, by the program's name."""
+    return rclpy.logging.get_logger(Path(sys.argv[0]).stem or "sysid")
 
 
 def _shut_down_once(told: SimpleQueue[None], handle: Any) -> None:

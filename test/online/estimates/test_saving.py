@@ -18,10 +18,11 @@ ESTIMATES = Estimates(
 )
 
 
-def save(folder: Path, aircraft: str = "cdrw") -> Path:
+def save(folder: Path, aircraft: str = "cdrw", node: str = "/identifier") -> Path:
     return save_estimates(
         folder,
         ESTIMATES,
+        node=node,
         aircraft=aircraft,
         settings=OnlineSettings(),
         stamp_ns=7,
@@ -35,6 +36,12 @@ def test_a_second_save_replaces_the_first_and_leaves_no_other_file(tmp_path: Pat
     assert path.name == "cdrw-7.json"
     assert save(tmp_path / "new") == path
     assert [file.name for file in path.parent.iterdir()] == [path.name]
+
+
+def test_aircraft_of_one_type_that_fly_together_keep_their_files_apart(tmp_path: Path) -> None:
+    names = [save(tmp_path, node=f"/fleet/{uav}/identifier").name for uav in ("uav1", "uav2")]
+    assert names == ["fleet-uav1-cdrw-7.json", "fleet-uav2-cdrw-7.json"]
+    assert json.loads((tmp_path / names[1]).read_text(encoding="utf-8"))["node"] == "/fleet/uav2/identifier"
 
 
 def test_content_is_json_with_null_for_nan(tmp_path: Path) -> None:
