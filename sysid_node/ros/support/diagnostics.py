@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from sysid_node.flight.checks import CLOCK_STEP, gap
+from sysid_node.flight.checks import CLOCK_STEP, DUPLICATE, OUT_OF_ORDER, UNSTAMPED, gap
 from sysid_node.flight.live.monitor import Durations, TopicMonitor
 from sysid_node.flight.live.recent_counts import ALL, RecentTopic
 from sysid_node.online.types import Estimates
@@ -131,6 +131,15 @@ def lag_words(lag: float) -> str:
     return f"{1e3 * lag:.1f} ms after its sample" if lag > -LATE else f"{-lag:.1f} s before the stamp of its sample"
 
 
+#: What to do about messages that are left out for their stamps.
+_REMEDIES = {
+    CLOCK_STEP: "was the clock set, or did a recording begin anew? The record goes on after a break",
+    UNSTAMPED: "have the driver put the time of measurement into the header",
+    DUPLICATE: "does the topic have two publishers, or a driver that repeats messages?",
+    OUT_OF_ORDER: "does the topic have two publishers, with clocks that differ?",
+}
+
+
 def rejections(
     recent: Sequence[RecentTopic], resolved: Mapping[str, str], max_gap: float = 0.0, parameter: str = " (max_gap)"
 ) -> dict[str, str]:
@@ -151,9 +160,9 @@ def rejections(
 
 
 def _remedy(reason: str, resolved: Mapping[str, str], max_gap: float, parameter: str) -> str:
-    """What to do where messages are left out for gaps in another topic, or for a clock that was set; else empty."""
-    if reason == CLOCK_STEP:
-        return ": was the clock set, or did a recording begin anew? The record goes on after a break"
+    """What to do about messages that are left out for gaps in another topic, or for their stamps; else empty."""
+    if reason in _REMEDIES:
+        return f": {_REMEDIES[reason]}"
     other = next((name for topic, name in resolved.items() if reason == gap(topic)), "")
     if not other or not max_gap:
         return ""

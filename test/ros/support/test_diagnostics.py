@@ -72,6 +72,20 @@ def test_a_clock_that_was_set_is_said_although_it_costs_one_message() -> None:
     assert "was the clock set, or did a recording begin anew? The record goes on after a break" in status.message
 
 
+@pytest.mark.parametrize(
+    ("reason", "remedy"),
+    [
+        ("no stamp", "have the driver put the time of measurement into the header"),
+        ("duplicate stamp", "does the topic have two publishers, or a driver that repeats messages?"),
+        ("out of order", "does the topic have two publishers, with clocks that differ?"),
+    ],
+)
+def test_stamps_that_cannot_be_used_are_said_with_what_to_do(reason: str, remedy: str) -> None:
+    imu, rejected = heard("imu/data", 100), {f"imu/data: {reason}": 100}
+    status = SOURCE.input([imu], rejected, 60.0, RecentCounts().update([imu], rejected))
+    assert f"all of 100 messages rejected, most as {reason}: {remedy}" in status.message
+
+
 def test_what_was_rejected_at_the_start_is_forgotten_after_ten_seconds() -> None:
     now = [0.0]
     imu, recent, levels = TopicMonitor("imu/data"), RecentCounts(lambda: now[0]), []
