@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.flight.actuation import Actuation
 from sysid_node.flight.align import flight_record
 from sysid_node.flight.csv import read_csv
@@ -33,6 +34,9 @@ ANALYSIS_RATE = 50.0
 
 #: Shortest flight that can be diagnosed, s: three windows of at least a short period each.
 SHORTEST_FLIGHT = 6.0
+
+#: A longer step than this (s), and than so many usual ones, is an interruption: no signal is interpolated across it.
+_INTERRUPTION, _USUAL_STEPS = 0.2, 5.0
 
 _LATERAL = ("ay", "p", "r", "beta")
 
@@ -105,7 +109,7 @@ def completed_flight(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     Only its longest part without an interruption is kept. Raises InputError where another signal is missing, or where
     the flight is too short.
     """
-    record, begin = _longest_run(flight.record)
+    record, begin = _longest_run(flight.record, flight.source)
     flight = _with_flow_angles(aircraft, replace(flight, record=record, begin=flight.begin + begin))
     return _with_thrust(aircraft, _with_lateral(aircraft, flight))
 
@@ -123,7 +127,8 @@ def _with_lateral(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
         raise InputError(f"{flight.source}: no complete {', '.join(missing)}; the gap cannot be measured without")
     if record.duration < SHORTEST_FLIGHT:
         raise InputError(
-            f"{flight.source}: {record.duration:.1f} s of flight; the gap needs {SHORTEST_FLIGHT:g} s or more"
+            f"{flight.source}: {record.duration:.1f} s of flight without interruption; the gap needs "
+            f"{SHORTEST_FLIGHT:g} s or more"
         )
     if lateral:
         return replace(flight, record=record)
@@ -163,15 +168,27 @@ def with_inferred_signals(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     return replace(flight, record=with_inferred_thrust(aircraft, flight.record))
 
 
-def _longest_run(record: FlightRecord) -> tuple[FlightRecord, float]:
-    """The longest part without an interruption of more than half a second, and when it begins, s.
+def _longest_run(record: FlightRecord, source: str) -> tuple[FlightRecord, float]:
+    """The longest part without an interruption, and when it begins, s; warns (InputWarning) of what is left out.
 
     Its own time begins at zero.
     """
-    breaks = np.flatnonzero(np.diff(record.time) > 0.5)
-    edges = np.concatenate([[0], breaks + 1, [len(record)]])
-    longest = int(np.argmax(np.diff(edges)))
-    keep = slice(int(edges[longest]), int(edges[longest + 1]))
+    steps = np.diff(record.time)
+    breaks = np.flatnonzero(steps > max(_INTERRUPTION, _USUAL_STEPS * float(np.median(steps))))
+    if not breaks.size:
+        keep = slice(0, len(record))
+    else:
+        edges = np.concatenate([[0], breaks + 1, [len(record)]])
+        longest = int(np.argmax(np.diff(edges)))
+        keep = slice(int(edges[longest]), int(edges[longest + 1]))
+        used = float(record.time[keep][-1] - record.time[keep][0])
+        often = "once" if breaks.size == 1 else f"{breaks.size} times"
+        warnings.warn(
+            f"{source}: the recording is interrupted {often} for more than {_INTERRUPTION:g} s; the gap is measured on "
+            f"the longest part without interruption, {used:.3g} of {record.duration:.3g} s",
+            InputWarning,
+            stacklevel=2,
+        )
     columns = {name: values[keep] for name, values in record.columns.items()}
     time, first = record.time[keep], float(record.time[keep][0])
     start, commanded = record.start_ns + round(1e9 * first), record.commanded
@@ -216,9 +233,17 @@ _TURNING = frozenset({"phi", "psi"})
 
 
 def _on_grid(time: Array, values: Array, grid: Array, *, smooth: bool) -> Array:
-    """A series interpolated to the times of a grid, s."""
-    interpolated: Array = CubicSpline(time, values)(grid) if smooth else np.interp(grid, time, values)
-    return interpolated
+    """A series interpolated to the times of a grid, s; linearly where samples are missing.
+
+    There a spline would go far astray, because it continues the slope that two noisy samples have.
+    """
+    linear: Array = np.interp(grid, time, values)
+    if not smooth:
+        return linear
+    steps = np.diff(time)
+    missing = steps > _USUAL_STEPS * float(np.median(steps))
+    before = np.clip(np.searchsorted(time, grid, side="right") - 1, 0, steps.size - 1)
+    return np.where(missing[before], linear, CubicSpline(time, values)(grid))
 
 
 def _slope(values: Array, rate: float) -> Array:

@@ -9,7 +9,7 @@ import pytest
 from sysid_node import load
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.flight.csv import write_csv
 from sysid_node.flight.logs.fractions import between_commands
 from sysid_node.flight.record import FlightRecord
@@ -107,15 +107,37 @@ def test_a_heading_through_south_is_not_smeared(plain) -> None:
 def test_only_the_longest_part_without_an_interruption_is_kept(aircraft, time) -> None:
     flight = flight_with(aircraft)
     interrupted = time + 3.0 * (time > 6.0)
-    kept = completed_flight(aircraft, replace(flight, record=replace(flight.record, time=interrupted)))
+    with pytest.warns(InputWarning, match=r"once for more than 0\.2 s; .* longest part .*, [\d.]+ of [\d.]+ s"):
+        kept = completed_flight(aircraft, replace(flight, record=replace(flight.record, time=interrupted)))
     assert kept.record.duration == pytest.approx(DURATION - 6.0, abs=2.0 / RATE)
     assert kept.record.time[0] == 0.0
+
+
+@pytest.mark.parametrize("seconds", [0.25, 0.45])
+def test_nothing_is_interpolated_across_an_interruption(aircraft, time, seconds: float) -> None:
+    flight = flight_with(aircraft)
+    interrupted = time + seconds * (time > 6.0)
+    with pytest.warns(InputWarning, match="interrupted once"):
+        kept = completed_flight(aircraft, replace(flight, record=replace(flight.record, time=interrupted)))
+    assert kept.record.duration == pytest.approx(max(6.0, DURATION - 6.0), abs=2.0 / RATE)
+
+
+def test_a_few_missing_samples_are_bridged_within_the_noise(aircraft, time) -> None:
+    """Truth: a constant rate. A spline would continue the slope that the noise of two samples makes."""
+    noisy = 0.01 * np.random.default_rng(3).normal(size=time.size)
+    whole = flight_with(aircraft, q=noisy)
+    kept = ~((time > 5.0) & (time < 5.15))
+    columns = {name: values[kept] for name, values in whole.record.columns.items()}
+    holed = replace(whole, record=replace(whole.record, time=time[kept], columns=columns))
+    assert completed_flight(aircraft, holed).record.duration == pytest.approx(whole.record.duration)
+    assert np.abs(resampled(holed)["q"]).max() < 0.03
 
 
 def test_a_part_knows_when_it_begins(aircraft, time) -> None:
     flight = flight_with(aircraft)
     interrupted = time + 3.0 * (time > 2.0)
-    kept = completed_flight(aircraft, replace(flight, record=replace(flight.record, time=interrupted)))
+    with pytest.warns(InputWarning, match="interrupted once"):
+        kept = completed_flight(aircraft, replace(flight, record=replace(flight.record, time=interrupted)))
     assert kept.begin == pytest.approx(5.0, abs=2.0 / RATE)
     assert (kept.record.start_ns - flight.record.start_ns) * 1e-9 == pytest.approx(kept.begin)
 
@@ -158,5 +180,5 @@ def test_a_flight_that_is_too_short_is_refused(aircraft, time) -> None:
     flight = flight_with(aircraft)
     columns = {name: values[time < 5.0] for name, values in flight.record.columns.items()}
     short = replace(flight, record=FlightRecord(time[time < 5.0], columns))
-    with pytest.raises(InputError, match=r"5\.0 s of flight; the gap needs 6 s or more"):
+    with pytest.raises(InputError, match=r"5\.0 s of flight without interruption; the gap needs 6 s or more"):
         completed_flight(aircraft, short)
