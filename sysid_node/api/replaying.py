@@ -199,7 +199,7 @@ class _Run:
         self.joints: tuple[str, ...] = ()
         self.commands_from, self.frame_id = math.inf, ""
         self.began = math.inf  # s
-        self.density = np.empty(0)  # kg/m^3, the first that was measured; without it NaN
+        self.density_measured = False  # whether any air data told it
         self.done = 0  # messages
 
     def take(self, piece: FlightPiece) -> None:
@@ -210,9 +210,7 @@ class _Run:
             self.alignment = PieceAlignment(self.aircraft, self.settings.max_gap, carried)
             interval = streams.actuators.interval
             self.state = estimator.init(self.aircraft, self.settings, command_interval=interval)
-        if not np.isfinite(self.density).any():
-            measured = streams.air_data.values[:, 3]
-            self.density = np.append(measured[np.isfinite(measured)], np.nan)[:1]
+        self.density_measured |= bool(np.isfinite(streams.air_data.values[:, 3]).any())
         self.joints, self.frame_id = streams.actuators.names, streams.imu.frame_id or self.frame_id
         self.spans = joined_spans(self.spans, stamp_spans(streams))
         count = sum(len(stream.arrival) for stream in streams.by_topic.values())
@@ -270,7 +268,8 @@ class _Run:
         inputs = self.state.inputs
         broken = inputs.interruptions.fault(inputs.previous[0], self.settings.max_gap) if inputs.previous else ""
         opposite = opposite_estimates(self.aircraft, final.derivatives)
-        warn_without_density(self.aircraft, self.density, self.flight.name)
+        if not self.density_measured:
+            warn_without_density(self.aircraft, self.flight.name)
         for wrong in filter(None, (inputs.unchanging.fault, broken, *opposite)):
             warnings.warn(f"{self.flight.name}: {wrong}", InputWarning, stacklevel=2)
         seconds = last - self.began

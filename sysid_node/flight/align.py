@@ -231,16 +231,15 @@ def screen_air_data(aircraft: Aircraft, stream: AirDataStream, last: int | None 
     return screen(stream.arrival, np.column_stack([values[:, :3], density]), air_data_faults(values), last)
 
 
-def warn_without_density(aircraft: Aircraft, density: Array, name: str) -> None:
-    """Warn (InputWarning) where none of a flight's densities (N,) kg/m^3 was measured: the file's counts then."""
-    if density.size and not np.isfinite(density).any():
-        warnings.warn(
-            f"{name}: no air density was recorded; the aircraft file's {aircraft.reference.air_density:.3g} kg/m^3 is "
-            "taken, and all derivatives are off by the factor by which it is off: record it (from pressure and "
-            "temperature), or give reference.air_density the flight's value",
-            InputWarning,
-            stacklevel=2,
-        )
+def warn_without_density(aircraft: Aircraft, name: str) -> None:
+    """Warn (InputWarning) that no air density was measured in a flight, so that the aircraft file's is taken."""
+    warnings.warn(
+        f"{name}: no air density was recorded; the aircraft file's {aircraft.reference.air_density:.3g} kg/m^3 is "
+        "taken, and where it is wrong, all derivatives are wrong by the same factor: record it (from pressure and "
+        "temperature), or give reference.air_density the flight's value",
+        InputWarning,
+        stacklevel=2,
+    )
 
 
 def buffer_ns(max_gap: float) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,9 @@ COLUMNS = {
     "da": "aileron, rad",
     "dr": "rudder, rad",
 }
+
+#: No step of fewer usual ones than this is an interruption, however slow the record is.
+USUAL_STEPS = 5.0
 
 
 @dataclass(frozen=True)
@@ -89,3 +93,17 @@ class FlightRecord:
         keep = (self.time >= start) & (self.time < stop)
         columns = {name: values[keep] for name, values in self.columns.items()}
         return replace(self, time=self.time[keep], columns=columns)
+
+
+def uninterrupted_parts(time: Array, longest: float) -> list[slice]:
+    """The parts of times (N,) between interruptions: steps longer than ``longest`` s, and than five usual ones."""
+    steps = np.diff(time)
+    limit = max(USUAL_STEPS * float(np.median(steps)), longest) if steps.size else longest
+    edges = [0, *(np.flatnonzero(steps > limit) + 1).tolist(), time.size]
+    return [slice(first, last) for first, last in pairwise(edges)]
+
+
+def interrupted_in_words(parts: int) -> str:
+    """How often a recording is interrupted that consists of so many ``parts``, two or more."""
+    often = "once" if parts == 2 else f"{parts - 1} times"
+    return f"the recording is interrupted {often}"

@@ -7,17 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.flight.record import FlightRecord
+from sysid_node.flight.record import FlightRecord, interrupted_in_words, uninterrupted_parts
 
-#: No step of fewer usual ones than this is an interruption, however slow the record is.
-_USUAL_STEPS = 5.0
-
-#: A stretch of fewer samples, or seconds, tells no more of the motion than of its own initial state.
+#: A stretch of fewer samples, or seconds, tells of little more than its own initial state.
 _FEWEST, _SHORTEST = 20, 2.0
 
 #: A stretch that is never as fast as this share of the flight's highest airspeed is not flown.
@@ -47,39 +43,40 @@ def stretches(record: FlightRecord, needed: Sequence[str], longest: float) -> tu
 
 def interruptions_in_words(record: FlightRecord, longest: float) -> str:
     """How often the recording is interrupted for longer than ``longest`` s, and for how long in all; empty if never."""
-    places = _interruptions(record, longest)
-    if not places.size:
+    parts = uninterrupted_parts(record.time, longest)
+    if len(parts) == 1:
         return ""
-    often = "once" if places.size == 1 else f"{places.size} times"
-    lost = float(np.diff(record.time)[places].sum())
-    return f"{record.name}: the recording is interrupted {often}, for {lost:.3g} of {record.duration:.3g} s in all"
-
-
-def _interruptions(record: FlightRecord, longest: float) -> NDArray[np.intp]:
-    """The last sample before each interruption."""
-    steps = np.diff(record.time)
-    return np.flatnonzero(steps > max(longest, _USUAL_STEPS * float(np.median(steps))))
+    lost = record.duration - sum(_seconds(record, part) for part in parts)
+    return f"{record.name}: {interrupted_in_words(len(parts))}, for {lost:.3g} of {record.duration:.3g} s in all"
 
 
 def _cut(record: FlightRecord, longest: float, remarks: list[str]) -> tuple[list[FlightRecord], list[str]]:
-    edges = [0, *(_interruptions(record, longest) + 1).tolist(), len(record)]
-    parts = [slice(first, last) for first, last in pairwise(edges) if _is_usable(record, first, last)]
-    if len(edges) == 2 or not parts:
+    """The usable parts between interruptions, and the ``remarks`` with one on them."""
+    parts = uninterrupted_parts(record.time, longest)
+    usable = [part for part in parts if _is_usable(record, part)]
+    if len(parts) == 1 or not usable:
         return [record], remarks
-    used = sum(float(record.time[part][-1] - record.time[part][0]) for part in parts)
-    stretches_used = f"{len(parts)} stretches of {used:.3g} s together are" if len(parts) > 1 else f"{used:.3g} s are"
-    remarks.append(f"{interruptions_in_words(record, longest)}; {stretches_used} used")
-    names = [f"{record.name} [{k + 1}/{len(parts)}]" for k in range(len(parts))] if len(parts) > 1 else [record.name]
-    return [_at(record, part, name) for part, name in zip(parts, names, strict=True)], remarks
+    used = f"{sum(_seconds(record, part) for part in usable):.3g} s"
+    said = f"{used} are" if len(usable) == 1 else f"{len(usable)} stretches of {used} together are"
+    names = [f"{record.name} [{k + 1}/{len(usable)}]" for k in range(len(usable))]
+    if len(usable) == 1:
+        names = [record.name]
+    cut = [_at(record, part, name) for part, name in zip(usable, names, strict=True)]
+    return cut, [*remarks, f"{interruptions_in_words(record, longest)}; {said} used"]
 
 
-def _is_usable(record: FlightRecord, first: int, last: int) -> bool:
-    """Whether a stretch is long enough, is flown, and has all that was measured in the flight."""
-    if last - first < _FEWEST or record.time[last - 1] - record.time[first] < _SHORTEST:
+def _seconds(record: FlightRecord, part: slice) -> float:
+    """How long a part is."""
+    return float(np.ptp(record.time[part]))
+
+
+def _is_usable(record: FlightRecord, part: slice) -> bool:
+    """Whether a part is long enough, is flown, and has all that was measured in the flight."""
+    if record.time[part].size < _FEWEST or _seconds(record, part) < _SHORTEST:
         return False
-    if record.measured("V") and not np.nanmax(record["V"][first:last], initial=0.0) > _SLOW * np.nanmax(record["V"]):
+    if record.measured("V") and not np.nanmax(record["V"][part], initial=0.0) > _SLOW * np.nanmax(record["V"]):
         return False
-    measured = (values[first:last] for name, values in record.columns.items() if record.measured(name))
+    measured = (values[part] for name, values in record.columns.items() if record.measured(name))
     return all(np.isfinite(values).any() for values in measured)
 
 

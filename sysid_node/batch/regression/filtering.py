@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.flight.record import Array, FlightRecord, uninterrupted_parts
 
-#: No slope is taken across a step of more than this many usual ones, and of more than 0.1 s.
-_GAP_STEPS, _GAP = 5.0, 0.1
+_INTERRUPTION = 0.1  # s: no slope is taken across a longer step
 
 
 def pieces(time: Array) -> list[slice]:
     """The parts of a flight between interruptions: steps of more than five usual ones, and of more than 0.1 s."""
-    steps = np.diff(time)
-    longest = max(_GAP_STEPS * float(np.median(steps)), _GAP) if steps.size else 0.0
-    edges = [0, *(np.flatnonzero(steps > longest) + 1).tolist(), time.size]
-    return [slice(first, last) for first, last in pairwise(edges)]
+    return uninterrupted_parts(time, _INTERRUPTION)
 
 
 def differentiate(time: Array, x: Array, half_width: int = 2, degree: int = 4) -> Array:

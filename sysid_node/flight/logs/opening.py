@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.actuation import joint_names
 from sysid_node.flight.align import MAX_GAP, flight_record, warn_without_density
@@ -124,11 +126,13 @@ def load_flight_record(
     """
     if is_table(path, topics, frame):
         record = _checked(aircraft, read_csv(path))
-        warn_without_density(aircraft, record["rho"], record.name)
+        if not record.measured("rho"):
+            warn_without_density(aircraft, record.name)
         return with_commands(aircraft, record, carried)
     streams = open_streams(path, aircraft, topics, frame)
     record = flight_record(aircraft, streams, max_gap, carried_by(streams, carried))
-    warn_without_density(aircraft, streams.air_data.values[:, 3], record.name)
+    if not np.isfinite(streams.air_data.values[:, 3]).any():
+        warn_without_density(aircraft, record.name)
     return _checked(aircraft, record)
 
 

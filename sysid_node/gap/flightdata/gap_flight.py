@@ -21,7 +21,13 @@ from sysid_node.flight.live.mean_lift import mean_lift
 from sysid_node.flight.live.reading_signs import checked_signs
 from sysid_node.flight.live.unchanging import changing_readings
 from sysid_node.flight.logs.opening import is_table, open_streams
-from sysid_node.flight.record import Array, FlightRecord
+from sysid_node.flight.record import (
+    USUAL_STEPS,
+    Array,
+    FlightRecord,
+    interrupted_in_words,
+    uninterrupted_parts,
+)
 from sysid_node.flight.streams import Streams
 from sysid_node.gap.flightdata.flow_angles import FilterHistory, missing_flow_angles, run_flow_angle_filter
 from sysid_node.gap.flightdata.thrust import thrust_missing, with_inferred_thrust
@@ -35,8 +41,7 @@ ANALYSIS_RATE = 50.0
 #: Shortest flight that can be diagnosed, s: three windows of at least a short period each.
 SHORTEST_FLIGHT = 6.0
 
-#: A longer step than this (s), and than so many usual ones, is an interruption: no signal is interpolated across it.
-_INTERRUPTION, _USUAL_STEPS = 0.2, 5.0
+_INTERRUPTION = 0.2  # s: no signal is interpolated across a longer step
 
 _LATERAL = ("ay", "p", "r", "beta")
 
@@ -173,19 +178,12 @@ def _longest_run(record: FlightRecord, source: str) -> tuple[FlightRecord, float
 
     Its own time begins at zero.
     """
-    steps = np.diff(record.time)
-    breaks = np.flatnonzero(steps > max(_INTERRUPTION, _USUAL_STEPS * float(np.median(steps))))
-    if not breaks.size:
-        keep = slice(0, len(record))
-    else:
-        edges = np.concatenate([[0], breaks + 1, [len(record)]])
-        longest = int(np.argmax(np.diff(edges)))
-        keep = slice(int(edges[longest]), int(edges[longest + 1]))
-        used = float(record.time[keep][-1] - record.time[keep][0])
-        often = "once" if breaks.size == 1 else f"{breaks.size} times"
+    parts = uninterrupted_parts(record.time, _INTERRUPTION)
+    keep = max(parts, key=lambda part: part.stop - part.start)
+    if len(parts) > 1:
         warnings.warn(
-            f"{source}: the recording is interrupted {often} for more than {_INTERRUPTION:g} s; the gap is measured on "
-            f"the longest part without interruption, {used:.3g} of {record.duration:.3g} s",
+            f"{source}: {interrupted_in_words(len(parts))} for more than {_INTERRUPTION:g} s; the gap is measured on "
+            f"the longest part without interruption, {np.ptp(record.time[keep]):.3g} of {record.duration:.3g} s",
             InputWarning,
             stacklevel=2,
         )
@@ -241,7 +239,7 @@ def _on_grid(time: Array, values: Array, grid: Array, *, smooth: bool) -> Array:
     if not smooth:
         return linear
     steps = np.diff(time)
-    missing = steps > _USUAL_STEPS * float(np.median(steps))
+    missing = steps > USUAL_STEPS * float(np.median(steps))
     before = np.clip(np.searchsorted(time, grid, side="right") - 1, 0, steps.size - 1)
     return np.where(missing[before], linear, CubicSpline(time, values)(grid))
 
