@@ -50,3 +50,14 @@ def test_errors_do_not_depend_on_how_dense_the_frequencies_are(otter):
 def test_impossible_bands_are_refused(frequencies, said):
     with pytest.raises(InputError, match=said):
         frequency_equation_error(KESTREL, [clean()], frequencies)
+
+
+def test_an_interruption_takes_no_more_than_the_missing_time():
+    """Truth: the same samples without the pause, beside which two samples would otherwise weigh as its eight seconds."""
+    rng, time = np.random.default_rng(5), np.arange(0.0, 40.0, 0.02)
+    x = np.sin(2.0 * np.pi * 0.5 * time) + np.sin(2.0 * np.pi * 1.1 * time)
+    y = 2.0 * x + 0.3 * rng.normal(size=time.size)
+    paused = np.where(time > 20.0, time + 8.0, time)
+    whole, cut = (regress_in_band(["x"], [t], [y], [x[:, None]], BAND).estimates["x"] for t in (time, paused))
+    assert cut.standard_error < 1.3 * whole.standard_error
+    assert abs(cut.value - 2.0) < 3.0 * cut.standard_error
