@@ -53,7 +53,7 @@ def test_impossible_bands_are_refused(frequencies, said):
 
 
 def test_an_interruption_takes_no_more_than_the_missing_time():
-    """Truth: the same samples without the pause, beside which two samples would otherwise weigh as its eight seconds."""
+    """Truth: the same samples without the pause. The two samples beside it would otherwise weigh as all of it."""
     rng, time = np.random.default_rng(5), np.arange(0.0, 40.0, 0.02)
     x = np.sin(2.0 * np.pi * 0.5 * time) + np.sin(2.0 * np.pi * 1.1 * time)
     y = 2.0 * x + 0.3 * rng.normal(size=time.size)
