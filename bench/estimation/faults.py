@@ -8,8 +8,9 @@ it know them to 2 %, as from an identifier. Surfaces are commands (`actuators` e
 position. Missed is what raises no alarm within 15 s, wrongly isolated what 5 s after its alarm is given another name.
 `--power` has faults grow from small to large and counts how many of them are found within which time.
 `--hours 4` flies hours in which nothing fails, half of them with 3-2-1-1s, half with a doublet a minute on each
-surface, and counts alarms, in every turbulence or in those that are named. Results are kept in files as they come;
-those that are there are not flown again, and the table sums up all of them.
+surface, and counts alarms, in every turbulence or in those that are named. With `--with-identifier` an online estimator
+identifies the same samples, as commands, and the monitor takes its estimates, as beside the node. Results are kept in
+files as they come; those that are there are not flown again, and the table sums up all of them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -31,6 +33,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults import monitor
 from sysid_node.faults.model.blocks import of_record
+from sysid_node.faults.model.reference_model import identifier_estimates
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.state import MonitorState
 from sysid_node.faults.types import (
@@ -42,7 +45,9 @@ from sysid_node.faults.types import (
     VANE_OFFSET,
     VANE_STUCK,
 )
-from sysid_node.online.types import SAMPLE_COLUMNS
+from sysid_node.online.replay import run
+from sysid_node.online.settings import OnlineSettings
+from sysid_node.online.types import SAMPLE_COLUMNS, Estimates
 
 Array = NDArray[np.float64]
 Break = Callable[[Array, Array, np.random.Generator], None]  # samples (N, M) from the onset on, the last one before
@@ -199,10 +204,21 @@ class Seen:
         return self.found and self.kind in case.kinds and self.part == case.part
 
 
-def watch(state: MonitorState, time: Array, samples: Array, onset: float) -> Seen:
-    """Let the monitor judge a flight."""
+def estimated(aircraft: Aircraft, time: Array, samples: Array) -> Iterator[Estimates]:
+    """What an online estimator says of a flight, once a second."""
+    seconds = np.arange(1.0, float(time[-1]))
+    yield from run(aircraft, OnlineSettings(), time, samples, seconds, commands_from=0)
+
+
+def watch(state: MonitorState, time: Array, samples: Array, onset: float, estimates: Iterable[Estimates] = ()) -> Seen:
+    """Let the monitor judge a flight, which takes the ``estimates`` when they are made."""
     early, found, named = 0, math.inf, None
+    coming = deque(estimates)
     for block in of_record(state.aircraft, time, samples):
+        while coming and coming[0].time <= block.time:
+            made = coming.popleft()
+            known = identifier_estimates(made.derivatives.values(), made.servos.values())
+            monitor.receive_estimates(state, made.time, known)
         before = state.alarm
         monitor.take(state, block)
         if state.alarm is not None and before is None:
@@ -315,7 +331,7 @@ def _keep(results: Path, one: object) -> None:
         file.write(json.dumps(one) + "\n")
 
 
-def hours(count: float, weathers: Sequence[str], first: int, results: Path) -> str:
+def hours(count: float, weathers: Sequence[str], first: int, results: Path, *, with_identifier: bool) -> str:
     """Fly hours in which nothing fails, those that are not yet in the file of results, and count alarms."""
     known = _kept(results)
     done = {(one["turbulence"], one["seed"]) for one in known}
@@ -325,7 +341,10 @@ def hours(count: float, weathers: Sequence[str], first: int, results: Path) -> s
                 continue
             setting = Setting("", turbulence, seconds=PART, manoeuvre=DOUBLETS if seed % 2 else ())
             batch = fly(NAME, setting, [seed])
-            seen = watch(monitored(seed, seed % 4 < 2), batch.time, batch.samples[0], math.inf)
+            samples = batch.samples[0]
+            state = monitored(seed, identified=not with_identifier and seed % 4 < 2)
+            estimates = estimated(state.aircraft, batch.time, samples) if with_identifier else ()
+            seen = watch(state, batch.time, samples, math.inf, estimates)
             known.append({"turbulence": turbulence, "seed": seed, "alarms": seen.early})
             _keep(results, known[-1])
     rows = []
@@ -356,13 +375,16 @@ def main() -> None:
     parser.add_argument("--hours", type=float, default=0.0, help="fly so many in each turbulence without a fault")
     parser.add_argument("--weathers", nargs="+", choices=WEATHERS, default=WEATHERS, help="of the hours (default: all)")
     parser.add_argument("--first", type=int, default=1, help="seed of the hours' first flight (default: 1)")
+    parser.add_argument("--with-identifier", action="store_true", help="of the hours: beside an online estimator")
     parser.add_argument("--power", action="store_true", help="count what is found by size and time instead")
     parser.add_argument("--results", type=Path, default=Path("out/faults"), help="folder (default: out/faults)")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
     if args.hours:
-        table_of_hours = hours(args.hours, args.weathers, args.first, args.results / "hours.jsonl")
-        publish("bench/estimation/faults.py --hours", table_of_hours, args.page)
+        beside = " --with-identifier" if args.with_identifier else ""
+        kept = args.results / f"hours{beside.replace(' --', '_').replace('-', '_')}.jsonl"
+        counted = hours(args.hours, args.weathers, args.first, kept, with_identifier=args.with_identifier)
+        publish(f"bench/estimation/faults.py --hours{beside}", counted, args.page)
         return
     mode = " --identified" if args.identified else ""
     kept = args.results / f"{'power' if args.power else 'faults'}{mode.replace(' --', '_')}.jsonl"

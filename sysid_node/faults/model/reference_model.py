@@ -108,8 +108,7 @@ def adopt_estimates(reference: ReferenceModel, now: float) -> bool:
             if name in reference.terms.names and one.valid and math.isfinite(one.value + one.standard_error):
                 taken = True
                 d = reference.terms.names.index(name)
-                change = one.value - reference.values[d]
-                reference.offsets[reference.terms.output[d]] -= change * reference.regressors[d]
+                _keep_mean(reference, d, one.value - reference.values[d])
                 _adopt(reference, d, one.value, one.standard_error)
         for name, one in known.servos.items():
             if name in reference.terms.servos and math.isfinite(one.value + one.standard_error):
@@ -118,6 +117,14 @@ def adopt_estimates(reference: ReferenceModel, now: float) -> bool:
                 for d, share, error in zip(servo, *shares_of(one.value, one.standard_error), strict=True):
                     _adopt(reference, int(d), float(share), float(error))
     return taken
+
+
+def _keep_mean(reference: ReferenceModel, d: int, change: float) -> None:
+    """Change the offset of a term's coefficient, so that a ``change`` of the term leaves its recent mean as it is."""
+    output = int(reference.terms.output[d])
+    less = change * reference.regressors[d]
+    reference.offsets[output] -= less
+    reference.v += less * reference.J[:, reference.terms.offset_of(output)]
 
 
 def _adopt(reference: ReferenceModel, d: int, value: float, error: float) -> None:
