@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -93,6 +93,21 @@ class FlightRecord:
         keep = (self.time >= start) & (self.time < stop)
         columns = {name: values[keep] for name, values in self.columns.items()}
         return replace(self, time=self.time[keep], columns=columns)
+
+
+def rows_with_values(record: FlightRecord, names: Sequence[str]) -> tuple[NDArray[np.bool_], list[str]]:
+    """(N,) whether a sample has a value of each of these columns, and the columns that lack some.
+
+    Columns that were never measured do not count.
+    """
+    measured = [name for name in names if record.measured(name)]
+    there = np.isfinite(np.array([record.time, *(record[name] for name in measured)]))
+    return there.all(axis=0), [name for name, values in zip(measured, there[1:], strict=True) if not values.all()]
+
+
+def lacking_in_words(complete: NDArray[np.bool_], names: Sequence[str]) -> str:
+    """How many samples are not ``complete`` (N,), because a value of one of these columns is missing."""
+    return f"{int((~complete).sum())} of {complete.size} samples lack a value of {', '.join(names)}"
 
 
 def uninterrupted_parts(time: Array, longest: float) -> list[slice]:

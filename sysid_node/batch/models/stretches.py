@@ -11,7 +11,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.flight.record import FlightRecord, interrupted_in_words, uninterrupted_parts
+from sysid_node.flight.record import (
+    FlightRecord,
+    interrupted_in_words,
+    lacking_in_words,
+    rows_with_values,
+    uninterrupted_parts,
+)
 
 #: A stretch of fewer samples, or seconds, tells of little more than its own initial state.
 _FEWEST, _SHORTEST = 20, 2.0
@@ -28,15 +34,12 @@ def stretches(record: FlightRecord, needed: Sequence[str], longest: float) -> tu
     which the rest of the flight has, are left out. The time of each begins at zero. A record without interruptions is
     returned as it is; so is one of which no stretch is left.
     """
-    measured = [name for name in needed if record.measured(name)]
-    complete = np.isfinite(np.array([record.time, *(record[name] for name in measured)])).all(axis=0)
+    complete, names = rows_with_values(record, needed)
     if 2 * int(complete.sum()) < len(record):
         return [record], []
     whole, remarks = record, []
-    if not complete.all():
-        names = [name for name in measured if not np.isfinite(record[name]).all()]
-        missing = f"{int((~complete).sum())} of {len(record)} samples lack a value of {', '.join(names)}"
-        remarks.append(f"{record.name}: {missing}, and were left out")
+    if names:
+        remarks.append(f"{record.name}: {lacking_in_words(complete, names)}, and were left out")
         whole = _at(record, complete, record.name)
     return _cut(whole, longest, remarks)
 

@@ -26,6 +26,8 @@ from sysid_node.flight.record import (
     Array,
     FlightRecord,
     interrupted_in_words,
+    lacking_in_words,
+    rows_with_values,
     uninterrupted_parts,
 )
 from sysid_node.flight.streams import Streams
@@ -44,6 +46,7 @@ SHORTEST_FLIGHT = 6.0
 _INTERRUPTION = 0.2  # s: no signal is interpolated across a longer step
 
 _LATERAL = ("ay", "p", "r", "beta")
+_NEEDED = ("ax", "az", "q", "V", "alpha", "rho", "thrust", *_LATERAL)
 
 
 @dataclass(frozen=True)
@@ -111,12 +114,22 @@ def _checked(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
 def completed_flight(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     """The flight with what was not measured: lateral signals as zeros, flow angles and thrust inferred.
 
-    Only its longest part without an interruption is kept. Raises InputError where another signal is missing, or where
-    the flight is too short.
+    Samples that lack a value of a signal are left out, and only the longest part without an interruption is kept.
+    Raises InputError where another signal is missing, or where the flight is too short.
     """
-    record, begin = _longest_run(flight.record, flight.source)
+    record, begin = _longest_run(_complete(aircraft, flight.record, flight.source), flight.source)
     flight = _with_flow_angles(aircraft, replace(flight, record=record, begin=flight.begin + begin))
     return _with_thrust(aircraft, _with_lateral(aircraft, flight))
+
+
+def _complete(aircraft: Aircraft, record: FlightRecord, source: str) -> FlightRecord:
+    """The record without the samples that lack a value, where these are at most half; warns (InputWarning) of them."""
+    complete, names = rows_with_values(record, [*_NEEDED, *aircraft.control_symbols])
+    if not names or 2 * int(complete.sum()) < len(record):
+        return record
+    warnings.warn(f"{source}: {lacking_in_words(complete, names)}, and are left out", InputWarning, stacklevel=2)
+    columns = {name: values[complete] for name, values in record.columns.items()}
+    return replace(record, time=record.time[complete], columns=columns)
 
 
 def _with_lateral(aircraft: Aircraft, flight: GapFlight) -> GapFlight:

@@ -133,6 +133,31 @@ def test_a_few_missing_samples_are_bridged_within_the_noise(aircraft, time) -> N
     assert np.abs(resampled(holed)["q"]).max() < 0.03
 
 
+@pytest.mark.parametrize("name", ["beta", "alpha", "thrust", "de"])
+def test_samples_without_a_value_are_left_out(aircraft, time, name: str) -> None:
+    """Truth: the same flight without these samples."""
+    whole = flight_with(aircraft)
+    lost = (time > 5.0) & (time < 5.1)
+    columns = {**whole.record.columns, name: np.where(lost, np.nan, whole.record[name])}
+    with pytest.warns(InputWarning, match=rf": 19 of 4001 samples lack a value of {name}, and are left out"):
+        kept = completed_flight(aircraft, replace(whole, record=replace(whole.record, columns=columns)))
+    assert kept.lateral and not kept.inferred and not kept.filled
+    np.testing.assert_array_equal(kept.record.time, time[~lost])
+    np.testing.assert_array_equal(kept.record["q"], whole.record["q"][~lost])
+
+
+def test_a_long_time_without_a_value_is_an_interruption(aircraft, time) -> None:
+    whole = flight_with(aircraft)
+    columns = {**whole.record.columns, "V": np.where((time > 5.0) & (time < 5.5), np.nan, whole.record["V"])}
+    with pytest.warns(InputWarning) as said:
+        kept = completed_flight(aircraft, replace(whole, record=replace(whole.record, columns=columns)))
+    assert [str(one.message).split(";")[0].split(": ")[1] for one in said] == [
+        "99 of 4001 samples lack a value of V, and are left out",
+        "the recording is interrupted once for more than 0.2 s",
+    ]
+    assert kept.record.duration == pytest.approx(DURATION - 5.5, abs=2.0 / RATE)
+
+
 def test_a_part_knows_when_it_begins(aircraft, time) -> None:
     flight = flight_with(aircraft)
     interrupted = time + 3.0 * (time > 2.0)
