@@ -59,6 +59,7 @@ OFFSETS = 30.0  # s over which offsets are learned
 USUAL = 60.0  # s, time constant of a statistic's mean
 DATED = 5.0  # s after an alarm in which its onset is estimated
 MUCH, LITTLE = 0.2, 1.5  # share of the largest log Bayes factor; multiple of the least residual energy
+LIKELY = 0.9  # share of the largest log Bayes factor that an onset has with one of the hypotheses
 CHANCE = 10.0  # residual energy due to chance, in units of a block's noise energy
 CONTRADICTED = 3.0  # log likelihood ratio
 OUTLIER = 10.0  # statistics enter their mean with at most this value
@@ -338,8 +339,10 @@ def _since(state: MonitorState, time: float) -> int:
 def _onset(state: MonitorState, alarm: Alarm) -> tuple[float, ModelPrior]:
     """The onset (s) and the prior at it: the maximum of the likelihood over the onset.
 
-    Hypotheses with many parameters also explain blocks before the change, so that their onset is too early. Therefore
-    the latest onset is taken that one of the well supported hypotheses has, and that leaves little residual energy.
+    Hypotheses with many parameters also explain blocks before the change, so that their onset is too early, and much
+    residual energy is left after it. Of the onsets that the well supported hypotheses have, and that are about as
+    likely as the best one, the earliest is taken that leaves little. The energy alone cannot decide: once the first
+    blocks after the change are in the prior, the following ones agree with it.
     """
     latest = max(_since(state, alarm.found), LEAST)
     counts = range(latest, max(_since(state, alarm.earliest), latest) + 1)
@@ -355,7 +358,8 @@ def _onset(state: MonitorState, alarm: Alarm) -> tuple[float, ModelPrior]:
     if not factors.max() > 0.0:
         return alarm.since, alarm.prior
     much = factors.max(axis=0) > MUCH * factors.max()
-    best = sorted(set(factors[:, much].argmax(axis=0).tolist()), reverse=True)
+    likely = factors.max(axis=1) >= LIKELY * factors.max()
+    best = [i for i in sorted(set(factors[:, much].argmax(axis=0).tolist()), reverse=True) if likely[i]]
     left = [_left(state, spans[i], alarm.usual) for i in best]
     return at(next(i for i, rest in zip(best, left, strict=True) if rest <= LITTLE * min(left)))
 
