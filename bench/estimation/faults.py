@@ -59,7 +59,8 @@ WEATHERS = ("none", "light", "moderate")
 BOUNDS = (WEATHERS[0], WEATHERS[-1])  # of the table of faults: light turbulence lies between
 ONSET, END, JUDGED = 40.0, 55.0, 5.0  # s: failure, end of a flight, from an alarm until the isolation is judged
 HOUR, PART = 3600.0, 600.0  # s
-IDENTIFIED = 0.02  # share to which an identifier knows the derivatives
+KNOWN_TO = 0.02  # share to which an identifier knows the derivatives
+IDENTIFIED, BESIDE = "identified", "with-identifier"  # how the monitor comes to know the derivatives; else by the file
 DOUBLETS = tuple(
     f"doublet:{surface}:amplitude={amplitude}:width=0.35:start={start}:every=60:repeat={int(PART / 60) - 1}"
     for surface, amplitude, start in (("elevator", 0.06, 10), ("aileron", 0.06, 25), ("rudder", 0.12, 40))
@@ -176,7 +177,7 @@ def monitored(seed: int, identified: bool) -> MonitorState:
         return monitor.init(believed(seed), FaultMonitorSettings())
     state = monitor.init(AIRCRAFT, FaultMonitorSettings())
     off = np.random.default_rng(2000 + seed).standard_normal(len(state.reference.values))
-    state.reference.errors = IDENTIFIED * np.abs(state.reference.values) + 1e-5
+    state.reference.errors = KNOWN_TO * np.abs(state.reference.values) + 1e-5
     state.reference.values = state.reference.values + state.reference.errors * off
     return state
 
@@ -232,7 +233,7 @@ def watch(state: MonitorState, time: Array, samples: Array, onset: float, estima
     return Seen(early, found - onset, *said)
 
 
-def watched(case: Case, turbulence: str, seeds: Sequence[int], identified: bool, end: float) -> list[Seen]:
+def watched(case: Case, turbulence: str, seeds: Sequence[int], knowledge: str, end: float) -> list[Seen]:
     """What the monitor sees in flights of ``end`` s."""
     setting = Setting("", turbulence, seconds=end, later=case.effects, onset=ONSET)
     if not case.effects:
@@ -243,7 +244,9 @@ def watched(case: Case, turbulence: str, seeds: Sequence[int], identified: bool,
         if case.broken is not None:
             first = int(np.searchsorted(batch.time, ONSET))
             case.broken(samples[first:], samples[first - 1], np.random.default_rng(seed))
-        seen.append(watch(monitored(seed, identified), batch.time, samples, ONSET))
+        state = monitored(seed, identified=knowledge == IDENTIFIED)
+        estimates = estimated(state.aircraft, batch.time, samples) if knowledge == BESIDE else ()
+        seen.append(watch(state, batch.time, samples, ONSET, estimates))
     return seen
 
 
@@ -252,7 +255,7 @@ class Series:
     """So many flights of each fault; those that are in the file of results are not flown again."""
 
     flights: int
-    identified: bool
+    knowledge: str  # what the monitor knows of the derivatives: one of the flags' names, or none
     end: float  # s
     results: Path
 
@@ -262,7 +265,7 @@ class Series:
         seen = {one["seed"]: Seen(**one["seen"]) for one in _kept(self.results) if this.items() <= one.items()}
         seeds = [seed for seed in range(1, self.flights + 1) if seed not in seen]
         if seeds:
-            seen |= zip(seeds, watched(case, turbulence, seeds, self.identified, self.end), strict=True)
+            seen |= zip(seeds, watched(case, turbulence, seeds, self.knowledge, self.end), strict=True)
         for seed in seeds:
             _keep(self.results, {**this, "seed": seed, "seen": asdict(seen[seed])})
         return [seen[seed] for seed in range(1, self.flights + 1)]
@@ -331,8 +334,11 @@ def _keep(results: Path, one: object) -> None:
         file.write(json.dumps(one) + "\n")
 
 
-def hours(count: float, weathers: Sequence[str], first: int, results: Path, *, with_identifier: bool) -> str:
-    """Fly hours in which nothing fails, those that are not yet in the file of results, and count alarms."""
+def hours(count: float, weathers: Sequence[str], first: int, results: Path, knowledge: str) -> str:
+    """Fly hours in which nothing fails, those that are not yet in the file of results, and count alarms.
+
+    Half of the flights are with derivatives known to 2 %, unless an identifier flies along.
+    """
     known = _kept(results)
     done = {(one["turbulence"], one["seed"]) for one in known}
     for seed in range(first, first + round(count * HOUR / PART)):
@@ -342,8 +348,8 @@ def hours(count: float, weathers: Sequence[str], first: int, results: Path, *, w
             setting = Setting("", turbulence, seconds=PART, manoeuvre=DOUBLETS if seed % 2 else ())
             batch = fly(NAME, setting, [seed])
             samples = batch.samples[0]
-            state = monitored(seed, identified=not with_identifier and seed % 4 < 2)
-            estimates = estimated(state.aircraft, batch.time, samples) if with_identifier else ()
+            state = monitored(seed, identified=knowledge != BESIDE and seed % 4 < 2)
+            estimates = estimated(state.aircraft, batch.time, samples) if knowledge == BESIDE else ()
             seen = watch(state, batch.time, samples, math.inf, estimates)
             known.append({"turbulence": turbulence, "seed": seed, "alarms": seen.early})
             _keep(results, known[-1])
@@ -371,28 +377,26 @@ def main() -> None:
     """Print the table, or put it in the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=10, help="of each fault and turbulence (default: 10)")
-    parser.add_argument("--identified", action="store_true", help="derivatives known to 2 %% instead")
+    known = parser.add_mutually_exclusive_group()
+    for flag, words in ((IDENTIFIED, "derivatives known to 2 %% instead"), (BESIDE, "beside an online estimator")):
+        known.add_argument(f"--{flag}", dest="knowledge", action="store_const", const=flag, default="", help=words)
     parser.add_argument("--hours", type=float, default=0.0, help="fly so many in each turbulence without a fault")
     parser.add_argument("--weathers", nargs="+", choices=WEATHERS, default=WEATHERS, help="of the hours (default: all)")
     parser.add_argument("--first", type=int, default=1, help="seed of the hours' first flight (default: 1)")
-    parser.add_argument("--with-identifier", action="store_true", help="of the hours: beside an online estimator")
     parser.add_argument("--power", action="store_true", help="count what is found by size and time instead")
     parser.add_argument("--results", type=Path, default=Path("out/faults"), help="folder (default: out/faults)")
     parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
     args = parser.parse_args()
+    what = "hours" if args.hours else "power" if args.power else "faults"
+    mode = f" --{args.knowledge}" if args.knowledge else ""
+    kept = args.results / f"{what}{mode.replace(' --', '_').replace('-', '_')}.jsonl"
+    flag = "" if what == "faults" else f" --{what}"
     if args.hours:
-        beside = " --with-identifier" if args.with_identifier else ""
-        kept = args.results / f"hours{beside.replace(' --', '_').replace('-', '_')}.jsonl"
-        counted = hours(args.hours, args.weathers, args.first, kept, with_identifier=args.with_identifier)
-        publish(f"bench/estimation/faults.py --hours{beside}", counted, args.page)
-        return
-    mode = " --identified" if args.identified else ""
-    kept = args.results / f"{'power' if args.power else 'faults'}{mode.replace(' --', '_')}.jsonl"
-    series = Series(args.flights, args.identified, ONSET + WITHIN[-1] if args.power else END, kept)
-    if args.power:
-        publish(f"bench/estimation/faults.py --power{mode}", power(series), args.page)
+        done = hours(args.hours, args.weathers, args.first, kept, args.knowledge)
     else:
-        publish(f"bench/estimation/faults.py{mode}", faults(series), args.page)
+        series = Series(args.flights, args.knowledge, ONSET + WITHIN[-1] if args.power else END, kept)
+        done = power(series) if args.power else faults(series)
+    publish(f"bench/estimation/faults.py{flag}{mode}", done, args.page)
 
 
 if __name__ == "__main__":
