@@ -36,8 +36,9 @@ from sysid_node.faults.hypotheses.weighing import (
     vane_noise,
     weights,
 )
-from sysid_node.faults.model import blocks, gust_correlation, reference_model, residual_whitening
+from sysid_node.faults.model import blocks, gust_correlation, reference_model, residual_whitening, vane_variation
 from sysid_node.faults.model.blocks import PERIOD, Block
+from sysid_node.faults.model.instrument_noise import least_variances
 from sysid_node.faults.model.reference_model import IdentifierEstimates, ModelPrior
 from sysid_node.faults.model.residual_whitening import ORDER
 from sysid_node.faults.model.terms import Terms, design_of, terms
@@ -102,7 +103,7 @@ def take(state: MonitorState, block: Block) -> None:
     if learning:
         _learn(state, block, residual)
         if history.count % RENEWED == 0:
-            residual_whitening.settle(state.whitening)
+            _settle(state, block)
     if len(history.raw) == ORDER:
         piece = _piece(state, block, design, residual)
         history.pieces.append(piece)
@@ -111,6 +112,12 @@ def take(state: MonitorState, block: Block) -> None:
         elif learned(state) > SETTLED * state.settings.learning:
             _learn_model(state)
     history.raw.append(_compare_with_reference(state, block))
+
+
+def _settle(state: MonitorState, now: Block) -> None:
+    """Compute the whitening anew, with no less noise than the instruments have."""
+    state.whitening.least = least_variances(state.aircraft, now.samples, PERIOD)
+    residual_whitening.settle(state.whitening)
 
 
 def learned(state: MonitorState) -> float:
@@ -158,6 +165,7 @@ def _judge(state: MonitorState, piece: WhitenedBlock) -> None:
 def _learn(state: MonitorState, block: Block, residual: Array) -> None:
     """Learn autocorrelation, offsets and mean regressors from a block without a fault."""
     residual_whitening.learn(state.whitening, residual, block.follows)
+    vane_variation.learn(state.variation, block.air, block.follows)
     known = state.reference
     weight = max(PERIOD / OFFSETS, 1.0 / (state.history.count or 1))
     known.offsets += weight * (residual / block.regressors[OFFSET] - known.offsets)
@@ -203,7 +211,7 @@ def _explained(terms: Terms, last: Sequence[Block]) -> NDArray[np.bool_]:
 
 def _renew(state: MonitorState, now: Block) -> None:
     """Update reference model, prior and hypotheses by what has been learned."""
-    residual_whitening.settle(state.whitening)
+    _settle(state, now)
     if reference_model.adopt_estimates(state.reference, now.time):
         _rebuild(state)
     variances = vane_noise(state, now.samples)

@@ -16,6 +16,7 @@ from sysid_node.faults.model.blocks import Block, BlockAverager
 from sysid_node.faults.model.reference_model import ModelPrior, ReferenceModel
 from sysid_node.faults.model.residual_whitening import ORDER, WhiteningFilter
 from sysid_node.faults.model.terms import Terms
+from sysid_node.faults.model.vane_variation import VaneVariation
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import Fault
 
@@ -82,6 +83,7 @@ class MonitorState:
     blocks: BlockAverager
     reference: ReferenceModel
     whitening: WhiteningFilter
+    variation: VaneVariation = field(default_factory=VaneVariation)
     history: BlockHistory = field(default_factory=BlockHistory)
     renewed: FaultHypotheses | None = None  # None: nothing has been tested yet
     explained: NDArray[np.bool_] = field(

@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 VANES = {"alpha": (1, COEFFICIENTS.index("CL")), "beta": (2, COEFFICIENTS.index("CY"))}
 
 
+LEAST_NOISE = 1e-14  # rad^2, variance of a vane's noise that counts at least: far below any vane's
 LOOSE = 0.1  # relative difference of a fault from its hypothesis that is allowed for
 ENOUGH = 3  # least number of blocks before the onset that refine the prior
 LONG = 20  # blocks, from which on the noise of the vanes is corrected for
@@ -205,14 +206,24 @@ def excess(state: MonitorState, over: FlightInterval, place: int, weighed: Weigh
 
 
 def vane_noise(state: MonitorState, samples: float) -> dict[str, float]:
-    """Variance (rad^2) of each vane's noise in a block of so many ``samples``: the file's, at most the residuals'."""
+    """Variance (rad^2) of each vane's noise in a block of so many ``samples``.
+
+    It is the file's, but no more than the residuals', and than what the readings have varied by.
+    """
+    varied = state.variation.most_noise
+    found = _noise_within(state, samples, residual_whitening.variances(state.whitening)).items()
+    return {vane: max(min(variance, float(varied[VANES[vane][0]])), LEAST_NOISE) for vane, variance in found}
+
+
+def _noise_within(state: MonitorState, samples: float, variances: Array) -> dict[str, float]:
+    """Variance (rad^2) of each vane's noise by the file, at most that of residuals with these ``variances`` (6,)."""
     found = {}
     for vane, (_, output) in VANES.items():
         terms = np.flatnonzero((state.terms.output == output) & state.terms.of(vane))
         if terms.size:
             taps = state.whitening.filter[:, output]
             slope = float(state.reference.values[terms[0]])
-            most = float(residual_whitening.scale(state.whitening)[output] / slope) ** 2 / (1.0 + float(taps @ taps))
+            most = float(variances[output]) / slope**2 / (1.0 + float(taps @ taps))
             found[vane] = min(state.aircraft.noise[vane] ** 2 / samples, most)
     return found
 
@@ -230,8 +241,9 @@ def stuck_vanes(state: MonitorState, pieces: Sequence[WhitenedBlock], counts: Se
         off = [(p.residual[output] / p.block.regressors[OFFSET] - state.reference.offsets[output]) for p in pieces]
         implied = read + np.array(off) / slope
         samples = float(np.mean([piece.block.samples for piece in pieces]))
-        noise = vane_noise(state, samples)[vane]
-        difference = float(residual_whitening.scale(state.whitening)[output] / slope) ** 2
+        variances = residual_whitening.counted_variances(state.whitening)
+        noise = _noise_within(state, samples, variances)[vane]
+        difference = float(variances[output]) / slope**2
         taps = state.whitening.filter[:, output]
         found[:, place] = [stuck_factor(read[-n:], implied[-n:], taps, noise, difference) for n in counts]
     return found

@@ -36,6 +36,7 @@ class WhiteningFilter:
     past: deque[Array] = field(default_factory=lambda: deque(maxlen=ORDER))
     filter: Array = field(default_factory=lambda: np.zeros((ORDER, 6)))
     unmix: Array = field(default_factory=lambda: np.eye(6))  # makes innovations uncorrelated, with variance 1
+    least: Array = field(default_factory=lambda: np.zeros(6))  # variances of the innovations that count at least
 
 
 def init(memory: float, period: float) -> WhiteningFilter:
@@ -59,13 +60,14 @@ def learn(whitening: WhiteningFilter, residual: Array, follows: bool) -> None:
 
 
 def settle(whitening: WhiteningFilter) -> None:
-    """Compute the filter from the sums."""
+    """Compute the filter from the sums. What innovations lack of the ``least`` counts as white noise besides."""
+    lacking = counted_variances(whitening) - variances(whitening)
     r0, r1, r2 = whitening.products / max(whitening.weight, 1.0)
-    r0 = r0 * (1.0 + _RIDGE) + _LEAST
+    r0 = r0 * (1.0 + _RIDGE) + _LEAST + lacking
     det = r0 * r0 - r1 * r1
     whitening.filter = np.array([(r0 * r1 - r1 * r2) / det, (r0 * r2 - r1 * r1) / det])
     covariance = whitening.innovations / max(whitening.weight, 1.0) + _LEAST * np.eye(6)
-    covariance += np.diag(np.maximum(_LEAST_NOISE - np.diag(covariance), 0.0))
+    covariance += np.diag(lacking)
     whitening.unmix = np.zeros((6, 6))
     for group in GROUPS:
         block = np.ix_(group, group)
@@ -80,6 +82,11 @@ def _cholesky(covariance: Array) -> Array:
         return np.diag(np.sqrt(np.diag(covariance)))
 
 
-def scale(whitening: WhiteningFilter) -> Array:
-    """(6,) standard deviation of the innovations; not zero, not even where no residual has ever changed."""
-    return np.asarray(np.sqrt(np.maximum(np.diag(whitening.innovations) / max(whitening.weight, 1.0), _LEAST_NOISE)))
+def variances(whitening: WhiteningFilter) -> Array:
+    """(6,) variances of the innovations, as they were."""
+    return np.asarray(np.diag(whitening.innovations) / max(whitening.weight, 1.0))
+
+
+def counted_variances(whitening: WhiteningFilter) -> Array:
+    """(6,) variances with which the innovations count; not zero, not even where no residual has ever changed."""
+    return np.maximum(variances(whitening), np.maximum(whitening.least, _LEAST_NOISE))
