@@ -310,9 +310,9 @@ def _follow(state: MonitorState, alarm: Alarm) -> None:
     remembered = pieces[0].block.time <= alarm.since + PERIOD
     if remembered:
         alarm.place = int(np.argmax(factors))
-    if remembered or factors[alarm.place] > state.settings.threshold:
+    if (remembered and factors[alarm.place] > 0.0) or factors[alarm.place] > state.settings.threshold:
         _name(state, alarm, found, factors)
-    if now - alarm.found > LAG * PERIOD and ((remembered and factors.max() < 0.0) or _contradicted(state, alarm)):
+    if now - alarm.found > LAG * PERIOD and ((remembered and factors.max() <= 0.0) or _contradicted(state, alarm)):
         state.alarm = state.fault = None
         state.history.pieces.clear()
         state.usual.clear()

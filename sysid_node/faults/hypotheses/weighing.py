@@ -244,6 +244,18 @@ def stuck_vanes(state: MonitorState, pieces: Sequence[WhitenedBlock], counts: Se
         variances = residual_whitening.counted_variances(state.whitening)
         noise = _noise_within(state, samples, variances)[vane]
         difference = float(variances[output]) / slope**2
+        difference += _unknown_part(state, pieces, output, int(terms[0])) / slope**2
         taps = state.whitening.filter[:, output]
         found[:, place] = [stuck_factor(read[-n:], implied[-n:], taps, noise, difference) for n in counts]
     return found
+
+
+def _unknown_part(state: MonitorState, pieces: Sequence[WhitenedBlock], output: int, slope: int) -> float:
+    """Variance of what a coefficient depends on besides one ``slope``, as far as the model does not know it."""
+    mine = np.flatnonzero((state.terms.output == output) & ~state.terms.of("0"))
+    mine = mine[mine != slope]
+    known = np.linalg.inv(state.hypotheses.prior.precision)[np.ix_(mine, mine)]
+    columns = state.terms.column[mine]
+    regressors = np.array([piece.block.regressors[columns] / piece.block.regressors[OFFSET] for piece in pieces])
+    regressors = regressors - regressors.mean(axis=0)
+    return float(np.einsum("ni,ij,nj->n", regressors, known, regressors).mean())

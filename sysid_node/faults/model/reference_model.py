@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 
 RIPE = 10.0  # s, age at which estimates are adopted
 REAL = 0.5  # least share of motion, not noise, in the information along a direction that is learned
+UNCONFIRMED = 3.0  # tolerances of the file that a derivative may be off before the flight has shown it, 1 sigma
 KEPT = 0.9995  # factor of the old information at each block: a memory of 200 s
 
 
@@ -82,12 +83,15 @@ class ModelPrior(NamedTuple):
 
 
 def init(terms: Terms) -> ReferenceModel:
-    """The reference model of the aircraft file."""
+    """The reference model of the aircraft file.
+
+    A fault is a change in flight. What the flight has not shown yet may differ from the file because the file is wrong.
+    """
     count = len(terms.names)
     nothing = np.zeros(count)
     none = np.zeros((count, count))
     return ReferenceModel(
-        terms, terms.values.copy(), terms.tolerance.copy(), nothing, none, nothing.copy(), none.copy()
+        terms, terms.values.copy(), UNCONFIRMED * terms.tolerance, nothing, none, nothing.copy(), none.copy()
     )
 
 
