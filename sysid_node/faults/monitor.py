@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.faults.hypotheses.bayes_factors import Shifts, Weighed
 from sysid_node.faults.hypotheses.catalogue import hypotheses
+from sysid_node.faults.hypotheses.vane_noise import VANES, noise_variances, readings, shares
 from sysid_node.faults.hypotheses.weighing import (
-    VANES,
+    LONG,
     FlightInterval,
     allowing_for_gusts,
     changed_since,
@@ -33,10 +34,9 @@ from sysid_node.faults.hypotheses.weighing import (
     promising,
     statistics,
     stuck_vanes,
-    vane_noise,
     weights,
 )
-from sysid_node.faults.model import blocks, gust_correlation, reference_model, residual_whitening, vane_variation
+from sysid_node.faults.model import blocks, gust_correlation, reference_model, residual_whitening
 from sysid_node.faults.model.blocks import PERIOD, Block
 from sysid_node.faults.model.instrument_noise import least_variances
 from sysid_node.faults.model.reference_model import IdentifierEstimates, ModelPrior
@@ -165,7 +165,6 @@ def _judge(state: MonitorState, piece: WhitenedBlock) -> None:
 def _learn(state: MonitorState, block: Block, residual: Array) -> None:
     """Learn autocorrelation, offsets and mean regressors from a block without a fault."""
     residual_whitening.learn(state.whitening, residual, block.follows)
-    vane_variation.learn(state.variation, block.air, block.follows)
     known = state.reference
     weight = max(PERIOD / OFFSETS, 1.0 / (state.history.count or 1))
     known.offsets += weight * (residual / block.regressors[OFFSET] - known.offsets)
@@ -182,10 +181,16 @@ def _learn_model(state: MonitorState) -> None:
     if len(state.history.pieces) <= LAG:
         return
     if state.history.count % RENEWED == 0 or not state.explained.size:
-        last = islice(state.history.pieces, len(state.history.pieces) - LAG - 1, None)
+        last = list(islice(state.history.pieces, len(state.history.pieces) - LAG - 1, None))
         state.explained = _explained(state.terms, [piece.block for piece in last])
+        state.noisy = shares(readings(state, last[:LONG]), _vane_noise(state, last[0].block))
     old = state.history.pieces[-LAG - 1]
-    reference_model.learn(state.reference, old.J, old.v, state.explained)
+    reference_model.learn(state.reference, old.J, old.v, state.explained, state.noisy)
+
+
+def _vane_noise(state: MonitorState, now: Block) -> dict[str, float]:
+    """Variance (rad^2) of each vane's noise in a block."""
+    return noise_variances(state, now.samples, residual_whitening.variances(state.whitening))
 
 
 def _explained(terms: Terms, last: Sequence[Block]) -> NDArray[np.bool_]:
@@ -214,14 +219,15 @@ def _renew(state: MonitorState, now: Block) -> None:
     _settle(state, now)
     if reference_model.adopt_estimates(state.reference, now.time):
         _rebuild(state)
-    variances = vane_noise(state, now.samples)
+    variances = _vane_noise(state, now)
     noise = {
         vane: reference_model.noise_of(state.terms, state.whitening, vane, variance)
         for vane, variance in variances.items()
     }
-    prior = reference_model.model_prior(
-        state.reference, sum(noise.values()) * state.reference.blocks, state.settings.slack
+    learned_noise = sum(
+        (noise[vane] * count for vane, count in state.reference.noisy.items()), np.zeros_like(state.reference.J)
     )
+    prior = reference_model.model_prior(state.reference, learned_noise, state.settings.slack)
     believed = state.reference.values + prior.shift
     commanded = reference_model.commanded(state.reference)
     each = hypotheses(state.aircraft, state.terms, reference_model.whole(state.reference, prior.shift), commanded)

@@ -16,7 +16,6 @@ from sysid_node.faults.model.blocks import Block, BlockAverager
 from sysid_node.faults.model.reference_model import ModelPrior, ReferenceModel
 from sysid_node.faults.model.residual_whitening import ORDER, WhiteningFilter
 from sysid_node.faults.model.terms import Terms
-from sysid_node.faults.model.vane_variation import VaneVariation
 from sysid_node.faults.settings import FaultMonitorSettings
 from sysid_node.faults.types import Fault
 
@@ -83,12 +82,12 @@ class MonitorState:
     blocks: BlockAverager
     reference: ReferenceModel
     whitening: WhiteningFilter
-    variation: VaneVariation = field(default_factory=VaneVariation)
     history: BlockHistory = field(default_factory=BlockHistory)
     renewed: FaultHypotheses | None = None  # None: nothing has been tested yet
     explained: NDArray[np.bool_] = field(
         default_factory=lambda: np.empty(0, dtype=bool)
     )  # (D,) terms with a large R^2, which are learned
+    noisy: dict[str, float] = field(default_factory=dict)  # share of each vane's noise in what is learned
     usual: deque[Array] = field(default_factory=lambda: deque(maxlen=LAG + 1))  # (S, H) mean statistics by block
     alarm: Alarm | None = None
     fault: Fault | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults.hypotheses.bayes_factors import (
     Weighed,
     marginal,
@@ -22,6 +21,7 @@ from sysid_node.faults.hypotheses.bayes_factors import (
 )
 from sysid_node.faults.hypotheses.catalogue import Hypothesis
 from sysid_node.faults.hypotheses.vane_check import stuck_factor
+from sysid_node.faults.hypotheses.vane_noise import VANES, VaneReadings, noise_variances, readings, slopes
 from sysid_node.faults.model import gust_correlation, residual_whitening
 from sysid_node.faults.model.reference_model import ModelPrior
 from sysid_node.faults.model.residual_whitening import ORDER
@@ -30,11 +30,6 @@ from sysid_node.online.frequency.regression_signals import OFFSET
 
 Array = NDArray[np.float64]
 
-#: Vanes: column of a block's air data, and the coefficient that depends on their angle.
-VANES = {"alpha": (1, COEFFICIENTS.index("CL")), "beta": (2, COEFFICIENTS.index("CY"))}
-
-
-LEAST_NOISE = 1e-14  # rad^2, variance of a vane's noise that counts at least: far below any vane's
 LOOSE = 0.1  # relative difference of a fault from its hypothesis that is allowed for
 ENOUGH = 3  # least number of blocks before the onset that refine the prior
 LONG = 20  # blocks, from which on the noise of the vanes is corrected for
@@ -80,7 +75,7 @@ def onsets(state: MonitorState, counts: Sequence[int], sound: int) -> list[Fligh
     prior's uncertainty would allow for is not mistaken for a change from one block to the next.
     """
     pieces, base_prior = _last(state, sound), state.hypotheses.prior
-    read = _readings(pieces)
+    read = readings(state, pieces)
     J, v = (np.cumsum([getattr(piece, name) for piece in pieces], axis=0) for name in "Jv")
     found = []
     for count in counts:
@@ -89,7 +84,11 @@ def onsets(state: MonitorState, counts: Sequence[int], sound: int) -> list[Fligh
         if n >= ENOUGH:
             before = (J[n - 1], v[n - 1])
             precision = base_prior.precision + before[0]
-            score = before[1] - before[0] @ base_prior.shift + _flattened(state, read[:n])
+            score = (
+                before[1]
+                - before[0] @ base_prior.shift
+                + _flattened(state, {vane: known.first(n) for vane, known in read.items()})
+            )
             prior = ModelPrior(base_prior.shift + np.linalg.solve(precision, score), precision)
         first = [_begun(piece, late, prior) for late, piece in enumerate(pieces[n : n + ORDER])]
         rest = [total[-1] - total[n + len(first) - 1] for total in (J, v)]
@@ -117,29 +116,19 @@ def _against(
 ) -> FlightInterval:
     """The interval of blocks whose information (D, D) and score (D,) about the reference values are ``sums``."""
     J, v = sums
-    v = v - J @ prior.shift + _flattened(state, _readings(pieces))
+    v = v - J @ prior.shift + _flattened(state, readings(state, pieces))
     return FlightInterval(pieces, prior, (J, v), *marginal(J, v, prior.precision))
 
 
-def _readings(pieces: Sequence[WhitenedBlock]) -> Array:
-    """(N, 3) the air data of the blocks."""
-    return np.array([piece.block.air for piece in pieces])
+def _flattened(state: MonitorState, known: Mapping[str, VaneReadings]) -> Array:
+    """(D,) the correction of the score for the noise of the vanes in some blocks (``vane_noise``).
 
-
-def _flattened(state: MonitorState, read: Array) -> Array:
-    """(D,) the correction of the score for the noise of the vanes, for blocks with air data ``read`` (N, 3).
-
-    Noise on a regressor biases the slope towards zero. In a long interval with little motion this would look like a
-    changed derivative (bias-compensated least squares: Soderstrom, Automatica 43, 2007, sec. 5). A vane whose readings
-    vary less than its noise has less noise than assumed: it is jammed, or better than the file says. In a short
-    interval the bias is at most half a log unit per block, and the noise cannot be estimated from the readings.
+    In a short interval the bias is at most half a log unit per block, and the noise cannot be estimated from it.
     """
     total = np.zeros(len(state.terms.names))
-    if len(read) < LONG:
-        return total
     for vane, (variance, score) in state.hypotheses.flattened.items():
-        variance_read = float(read[:, VANES[vane][0]].var(ddof=1))
-        total += min(1.0, variance_read / variance) * len(read) * score
+        if (count := known[vane].read.size) >= LONG:
+            total += known[vane].share(variance) * count * score
     return total
 
 
@@ -205,55 +194,27 @@ def excess(state: MonitorState, over: FlightInterval, place: int, weighed: Weigh
     return float((left**2).mean(axis=0).max())
 
 
-def vane_noise(state: MonitorState, samples: float) -> dict[str, float]:
-    """Variance (rad^2) of each vane's noise in a block of so many ``samples``.
-
-    It is the file's, but no more than the residuals', and than what the readings have varied by.
-    """
-    varied = state.variation.most_noise
-    found = _noise_within(state, samples, residual_whitening.variances(state.whitening)).items()
-    return {vane: max(min(variance, float(varied[VANES[vane][0]])), LEAST_NOISE) for vane, variance in found}
-
-
-def _noise_within(state: MonitorState, samples: float, variances: Array) -> dict[str, float]:
-    """Variance (rad^2) of each vane's noise by the file, at most that of residuals with these ``variances`` (6,)."""
-    found = {}
-    for vane, (_, output) in VANES.items():
-        terms = np.flatnonzero((state.terms.output == output) & state.terms.of(vane))
-        if terms.size:
-            taps = state.whitening.filter[:, output]
-            slope = float(state.reference.values[terms[0]])
-            most = float(variances[output]) / slope**2 / (1.0 + float(taps @ taps))
-            found[vane] = min(state.aircraft.noise[vane] ** 2 / samples, most)
-    return found
-
-
 def stuck_vanes(state: MonitorState, pieces: Sequence[WhitenedBlock], counts: Sequence[int] = ()) -> Array:
     """(N, 2) log Bayes factors of jammed vanes over the last ``counts`` (N) blocks, or over all."""
     counts = counts or [len(pieces)]
     found = np.zeros((len(counts), len(VANES)))
-    for place, (vane, (column, output)) in enumerate(VANES.items()):
-        terms = np.flatnonzero((state.terms.output == output) & state.terms.of(vane))
-        if not terms.size:
-            continue
-        slope = float(state.reference.values[terms[0]])  # what was learned since is too little to matter here
-        read = np.array([piece.block.air[column] for piece in pieces])
-        off = [(p.residual[output] / p.block.regressors[OFFSET] - state.reference.offsets[output]) for p in pieces]
-        implied = read + np.array(off) / slope
-        samples = float(np.mean([piece.block.samples for piece in pieces]))
-        variances = residual_whitening.counted_variances(state.whitening)
-        noise = _noise_within(state, samples, variances)[vane]
-        difference = float(variances[output]) / slope**2
-        difference += _unknown_part(state, pieces, output, int(terms[0])) / slope**2
-        taps = state.whitening.filter[:, output]
-        found[:, place] = [stuck_factor(read[-n:], implied[-n:], taps, noise, difference) for n in counts]
+    variances = residual_whitening.counted_variances(state.whitening)
+    noise = noise_variances(state, float(np.mean([piece.block.samples for piece in pieces])), variances)
+    known, slope = readings(state, pieces), slopes(state)
+    for place, (vane, (_, output)) in enumerate(VANES.items()):
+        if vane in known:
+            read, errors = known[vane]
+            implied = read + errors - state.reference.offsets[output] / slope[vane]
+            difference = (float(variances[output]) + _unknown_part(state, pieces, vane)) / slope[vane] ** 2
+            taps = state.whitening.filter[:, output]
+            factors = [stuck_factor(read[-n:], implied[-n:], taps, noise[vane], difference) for n in counts]
+            found[:, place] = factors
     return found
 
 
-def _unknown_part(state: MonitorState, pieces: Sequence[WhitenedBlock], output: int, slope: int) -> float:
-    """Variance of what a coefficient depends on besides one ``slope``, as far as the model does not know it."""
-    mine = np.flatnonzero((state.terms.output == output) & ~state.terms.of("0"))
-    mine = mine[mine != slope]
+def _unknown_part(state: MonitorState, pieces: Sequence[WhitenedBlock], vane: str) -> float:
+    """Variance of what a vane's force depends on besides its angle, as far as the model does not know it."""
+    mine = (state.terms.output == VANES[vane][1]) & ~state.terms.of("0") & ~state.terms.of(vane)
     known = np.linalg.inv(state.hypotheses.prior.precision)[np.ix_(mine, mine)]
     columns = state.terms.column[mine]
     regressors = np.array([piece.block.regressors[columns] / piece.block.regressors[OFFSET] for piece in pieces])

@@ -71,6 +71,7 @@ class ReferenceModel:
     J: Array  # (D, D) information of the flight without a fault
     v: Array  # (D,) its score about the values
     blocks: Array  # (D, D) number of blocks in it
+    noisy: dict[str, Array] = field(default_factory=dict)  # (D, D) of these, how many have the noise of each vane
     offsets: Array = field(default_factory=lambda: np.zeros(6))  # of the coefficients, part of the model
     pending: deque[tuple[float, IdentifierEstimates]] = field(default_factory=deque)
 
@@ -142,10 +143,17 @@ def commanded(reference: ReferenceModel) -> set[str]:
     return {name for name, (servo, _) in reference.terms.servos.items() if reference.errors[servo].any()}
 
 
-def learn(reference: ReferenceModel, J: Array, v: Array, chosen: NDArray[np.bool_]) -> None:
-    """Add the information of a block without a fault about the ``chosen`` terms (D,)."""
+def learn(
+    reference: ReferenceModel, J: Array, v: Array, chosen: NDArray[np.bool_], noisy: Mapping[str, float] | None = None
+) -> None:
+    """Add the information of a block without a fault about the ``chosen`` terms (D,).
+
+    ``noisy``: the share of each vane's noise that it has (``hypotheses.vane_noise``).
+    """
     both = np.outer(chosen, chosen)
     reference.blocks = KEPT * reference.blocks + both
+    for vane, share in (noisy or {}).items():
+        reference.noisy[vane] = KEPT * reference.noisy.get(vane, np.zeros_like(J)) + share * both
     reference.J = KEPT * reference.J + both * J
     reference.v = KEPT * reference.v + chosen * v
 
