@@ -3,8 +3,8 @@
 Noise on a regressor biases its slope towards zero, which is corrected for where data are learned from and where they
 are tested (bias-compensated least squares: Soderstrom, Automatica 43, 2007, sec. 5). A correction for noise that a vane
 does not have would do harm. The noise is therefore the file's, but at most what the flight's residuals leave room for,
-and in some blocks at most a share of it, where the readings vary by less, or the force agrees with them better: the
-vane is jammed then, or better than the file says.
+and in some blocks at most a share of it, where the readings vary by less from one block to the next, or the force agrees
+with them better: the vane is jammed then, or better than the file says.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 #: Vanes: column of a block's air data, and the coefficient that depends on their angle.
 VANES = {"alpha": (1, COEFFICIENTS.index("CL")), "beta": (2, COEFFICIENTS.index("CY"))}
 _GAIN = 20.0  # of a third difference: 1 + 9 + 9 + 1
-_CHANCE = 2.0  # times the mean square of some twenty differences that the noise's may be
+_CHANCE = 2.0  # times the mean square of some twenty values that the noise's variance may be
 LEAST = 1e-14  # rad^2, variance of a vane's noise that counts at least: far below any vane's
 
 
@@ -43,11 +43,9 @@ class VaneReadings(NamedTuple):
 
         The third difference of the readings holds the noise, with ``_GAIN`` times its variance, and little motion.
         """
-        varied = min(float(series.var(ddof=1)) for series in self)
         differences = np.diff(self.read, 3)
-        return min(
-            1.0, varied / variance, _CHANCE * float(differences @ differences) / differences.size / _GAIN / variance
-        )
+        room = [float(np.mean(differences**2)) / _GAIN, *(float(series.var(ddof=1)) for series in self)]
+        return min(1.0, _CHANCE * min(room) / variance)
 
 
 def slopes(state: MonitorState) -> dict[str, float]:

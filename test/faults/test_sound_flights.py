@@ -1,0 +1,91 @@
+"""Flights in which nothing fails, as users have them, and one fault in such a flight. The truth is what was flown."""
+
+from pathlib import Path
+
+import pytest
+
+from sysid_node import load, replay
+from sysid_node.aircraft.dump import dump_aircraft
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.cli.main import main
+from sysid_node.faults.recorded_flight import FaultVerdict
+from sysid_node.faults.types import LOSS
+from sysid_node.flight.csv import write_csv
+
+MANOEUVRE = ("--manoeuvre", "3211:repeat=3")
+
+
+def simulated(folder: Path, aircraft: str, *flown: str) -> Path:
+    """A flight in still air."""
+    bag = folder / "flight"
+    words = ["simulate", "--aircraft", aircraft, "--turbulence", "none", "--quiet", "--out", str(bag), *flown]
+    assert main(words) == 0
+    return bag
+
+
+def as_table(bag: Path, aircraft: str) -> Path:
+    """The same flight as a table of the IMU's rate, all else interpolated to it."""
+    write_csv(bag.with_suffix(".csv"), load(bag, aircraft).record)
+    return bag.with_suffix(".csv")
+
+
+def verdict_on(flight: Path, aircraft: str) -> FaultVerdict:
+    """What the replay says of faults."""
+    found = replay(load(flight, aircraft)).faults
+    assert found is not None
+    assert found.judged > 10.0
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("aircraft", ["cdrw", "cdfp", "kestrel"])
+@pytest.mark.parametrize("table", [False, True], ids=["bag", "table"])
+def test_sensors_without_noise_are_no_fault(tmp_path: Path, aircraft: str, table: bool) -> None:
+    """Residuals are model errors alone, which prove a fault when they are compared with themselves."""
+    flight = simulated(tmp_path, aircraft, *MANOEUVRE, "--noise", "0", "--seed", "3")
+    found = verdict_on(as_table(flight, aircraft) if table else flight, aircraft)
+    assert not found.episodes, found.sentences
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 41])
+def test_estimates_that_are_adopted_in_still_air_are_no_fault(tmp_path: Path, seed: int) -> None:
+    """What was learned before was about another offset, which counted as a change by hundreds of standard errors."""
+    flight = simulated(tmp_path, "cdrw", *MANOEUVRE, "--seed", str(seed))
+    found = verdict_on(as_table(flight, "cdrw"), "cdrw")
+    assert not found.episodes, found.sentences
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [28, 42])
+def test_the_size_of_a_fault_in_still_air_is_from_the_whole_of_it(tmp_path: Path, seed: int) -> None:
+    """An onset that is one block late puts the first block with the fault into the model without it."""
+    lost = "control_effectiveness_loss:elevator=0.4:onset=34"
+    flight = simulated(tmp_path, "cdrw", *MANOEUVRE, "--seed", str(seed), "--effect", lost)
+    (episode,) = verdict_on(as_table(flight, "cdrw"), "cdrw").episodes
+    assert (episode.fault.kind, episode.fault.part) == (LOSS, "elevator")
+    assert episode.fault.lower <= 0.4 <= episode.fault.upper
+
+
+@pytest.mark.slow
+def test_a_file_that_is_wrong_is_no_fault(tmp_path: Path) -> None:
+    """The first manoeuvre comes after the monitor has learned, from an aircraft that the file does not describe."""
+    flown = load_aircraft("cdrw")
+    late = "3211:elevator:start=24 + 3211:aileron:start=31 + 3211:rudder:start=38"
+    flight = simulated(tmp_path, "cdrw", "--manoeuvre", late, "--seed", "2", "--duration", "50")
+    text = dump_aircraft(flown)
+    for name, factor in {
+        "Cm_alpha": 0.8,
+        "Cm_de": 1.35,
+        "Cl_da": 0.7,
+        "Cl_beta": 1.4,
+        "Cn_dr": 1.3,
+        "CY_dr": 0.7,
+    }.items():
+        value = flown.derivatives[name].value
+        assert f"{value:.6g}" in text or str(value) in text
+        text = text.replace(f"{name}: {{value: {value}", f"{name}: {{value: {factor * value}")
+    file = tmp_path / "guess.yaml"
+    file.write_text(text, encoding="utf-8")
+    found = verdict_on(flight, str(file))
+    assert not found.episodes, found.sentences
