@@ -2,9 +2,9 @@
 
 Noise on a regressor biases its slope towards zero, which is corrected for where data are learned from and where they
 are tested (bias-compensated least squares: Soderstrom, Automatica 43, 2007, sec. 5). A correction for noise that a vane
-does not have would do harm. The noise is therefore the file's, but at most what the flight's residuals leave room for,
-and in some blocks at most a share of it, where the readings vary by less from one block to the next, or the force agrees
-with them better: the vane is jammed then, or better than the file says.
+does not have would do harm. The noise is therefore the file's, but at most what the flight's residuals leave room for.
+In some blocks it is at most a share of that: where the readings vary by less from one block to the next, or where the
+force agrees with them better. The vane is jammed then, or better than the file says.
 """
 
 from __future__ import annotations
