@@ -28,6 +28,8 @@ BY_CHANCE = 0.1  # correlation of the residuals of one interval with all regress
 CORRELATION = 0.5  # of residuals and regressors; 0.1 to 1 in moderate turbulence, by coefficient and flight
 ALIKE = 3.0  # ratio of information to the mean block's, up to which an interval has the same kind of motion
 LEAST = 20.0  # blocks that a term must have been learned from
+UNMOVED = 1e-6  # information learned of a term, in units of its prior's, below which nothing has been learned
+_EXACT = 1e-9  # standard error of a term that is known exactly
 _RIDGE = 1e-6
 
 
@@ -37,7 +39,9 @@ def gust_covariance(reference: ReferenceModel, information: Array) -> Array:
     ``information`` (D, D) is the mean information of a block of the interval.
     """
     terms = reference.terms
-    slopes = np.flatnonzero((terms.output >= 0) & ~terms.of("0") & (np.diag(reference.blocks) >= LEAST))
+    learned_from = np.diag(reference.blocks) >= LEAST
+    moved = np.diag(reference.J) * np.maximum(reference.errors, _EXACT) ** 2 > UNMOVED
+    slopes = np.flatnonzero((terms.output >= 0) & ~terms.of("0") & learned_from & moved)
     if not slopes.size:
         return np.zeros_like(information)
     count = np.sqrt(np.maximum(np.diag(reference.blocks), 1.0))
@@ -48,12 +52,12 @@ def gust_covariance(reference: ReferenceModel, information: Array) -> Array:
     times, axes = np.linalg.eigh(root @ _of_slopes(information, terms, slopes) @ root.T)
     unshared = np.maximum(1.0 - ALIKE / np.maximum(times, ALIKE), 0.0)
     shift = CORRELATION * (root.T @ axes) * unshared
-    moved = np.zeros((len(information), slopes.size))
-    moved[slopes] = shift
+    moves = np.zeros((len(information), slopes.size))
+    moves[slopes] = shift
     for output in set(terms.output[slopes].tolist()):  # the offset compensates for it, see ``model_prior``
         mine = terms.output[slopes] == output
-        moved[terms.offset_of(output)] = -reference.regressors[slopes[mine]] @ shift[mine]
-    return np.asarray(moved @ moved.T)
+        moves[terms.offset_of(output)] = -reference.regressors[slopes[mine]] @ shift[mine]
+    return np.asarray(moves @ moves.T)
 
 
 def usual_size_in_gusts(whole: NDArray[np.bool_], usual: Array, blocks: int) -> Array:
