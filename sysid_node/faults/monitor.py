@@ -183,7 +183,8 @@ def _learn_model(state: MonitorState) -> None:
     if state.history.count % RENEWED == 0 or not state.explained.size:
         last = list(islice(state.history.pieces, len(state.history.pieces) - LAG - 1, None))
         state.explained = _explained(state.terms, [piece.block for piece in last])
-        state.noisy = shares(readings(state, last[:LONG]), _vane_noise(state, last[0].block))
+        shift = state.renewed.prior.shift if state.renewed else np.zeros(len(state.terms.names))
+        state.noisy = shares(readings(state, last[:LONG], shift), _vane_noise(state, last[0].block))
     old = state.history.pieces[-LAG - 1]
     reference_model.learn(state.reference, old.J, old.v, state.explained, state.noisy)
 

@@ -24,19 +24,24 @@ Array = NDArray[np.float64]
 #: Vanes: column of a block's air data, and the coefficient that depends on their angle.
 VANES = {"alpha": (1, COEFFICIENTS.index("CL")), "beta": (2, COEFFICIENTS.index("CY"))}
 _GAIN = 20.0  # of a third difference: 1 + 9 + 9 + 1
-_CHANCE = 2.0  # times the mean square of some twenty values that the noise's variance may be
+_CHANCE = 2.0  # times the mean square of some twenty differences that the noise's may be
 LEAST = 1e-14  # rad^2, variance of a vane's noise that counts at least: far below any vane's
 
 
 class VaneReadings(NamedTuple):
-    """What blocks say of a vane: its readings (N,), and the errors (N,) of them that would explain its force, rad."""
+    """What blocks say of a vane, rad: its readings (N,), and errors (N,) of them that would explain the force's.
+
+    These follow from the residuals of the reference model, and from the innovations with what was learned since, scaled
+    so that white noise of the vane alone would have its own variance.
+    """
 
     read: Array
-    errors: Array
+    by_residual: Array
+    by_innovation: Array
 
     def first(self, count: int) -> VaneReadings:
         """The same of the first blocks."""
-        return VaneReadings(self.read[:count], self.errors[:count])
+        return VaneReadings(*(series[:count] for series in self))
 
     def share(self, variance: float) -> float:
         """The share of a noise of this ``variance`` (rad^2) that there is room for.
@@ -44,8 +49,8 @@ class VaneReadings(NamedTuple):
         The third difference of the readings holds the noise, with ``_GAIN`` times its variance, and little motion.
         """
         differences = np.diff(self.read, 3)
-        room = [float(np.mean(differences**2)) / _GAIN, *(float(series.var(ddof=1)) for series in self)]
-        return min(1.0, _CHANCE * min(room) / variance)
+        errors = (float(series.var(ddof=1)) for series in (self.by_residual, self.by_innovation))
+        return min(1.0, min(_CHANCE * float(np.mean(differences**2)) / _GAIN, *errors) / variance)
 
 
 def slopes(state: MonitorState) -> dict[str, float]:
@@ -72,14 +77,17 @@ def noise_variances(state: MonitorState, samples: float, variances: Array) -> di
     return found
 
 
-def readings(state: MonitorState, pieces: Sequence[WhitenedBlock]) -> dict[str, VaneReadings]:
-    """Of each vane in these blocks."""
+def readings(state: MonitorState, pieces: Sequence[WhitenedBlock], shift: Array) -> dict[str, VaneReadings]:
+    """Of each vane in these blocks, by the reference model with its values shifted (D,)."""
     found = {}
     for vane, slope in slopes(state).items():
         column, output = VANES[vane]
+        taps = state.whitening.filter[:, output]
+        size = state.whitening.unmix[output, output] * slope * np.sqrt(1.0 + taps @ taps)
         read = np.array([piece.block.air[column] for piece in pieces])
-        errors = [piece.residual[output] / piece.block.regressors[OFFSET] for piece in pieces]
-        found[vane] = VaneReadings(read, np.array(errors) / slope)
+        off = np.array([piece.residual[output] / piece.block.regressors[OFFSET] for piece in pieces])
+        left = np.array([piece.whitened[output] - piece.design[output] @ shift for piece in pieces])
+        found[vane] = VaneReadings(read, off / slope, left / size)
     return found
 
 

@@ -75,7 +75,7 @@ def onsets(state: MonitorState, counts: Sequence[int], sound: int) -> list[Fligh
     prior's uncertainty would allow for is not mistaken for a change from one block to the next.
     """
     pieces, base_prior = _last(state, sound), state.hypotheses.prior
-    read = readings(state, pieces)
+    read = readings(state, pieces, base_prior.shift)
     J, v = (np.cumsum([getattr(piece, name) for piece in pieces], axis=0) for name in "Jv")
     found = []
     for count in counts:
@@ -116,7 +116,7 @@ def _against(
 ) -> FlightInterval:
     """The interval of blocks whose information (D, D) and score (D,) about the reference values are ``sums``."""
     J, v = sums
-    v = v - J @ prior.shift + _flattened(state, readings(state, pieces))
+    v = v - J @ prior.shift + _flattened(state, readings(state, pieces, prior.shift))
     return FlightInterval(pieces, prior, (J, v), *marginal(J, v, prior.precision))
 
 
@@ -200,11 +200,12 @@ def stuck_vanes(state: MonitorState, pieces: Sequence[WhitenedBlock], counts: Se
     found = np.zeros((len(counts), len(VANES)))
     variances = residual_whitening.counted_variances(state.whitening)
     noise = noise_variances(state, float(np.mean([piece.block.samples for piece in pieces])), variances)
-    known, slope = readings(state, pieces), slopes(state)
-    for place, (vane, (_, output)) in enumerate(VANES.items()):
-        if vane in known:
-            read, errors = known[vane]
-            implied = read + errors - state.reference.offsets[output] / slope[vane]
+    slope, offsets = slopes(state), state.reference.offsets
+    for place, (vane, (column, output)) in enumerate(VANES.items()):
+        if vane in slope:
+            read = np.array([piece.block.air[column] for piece in pieces])
+            off = [piece.residual[output] / piece.block.regressors[OFFSET] - offsets[output] for piece in pieces]
+            implied = read + np.array(off) / slope[vane]
             difference = (float(variances[output]) + _unknown_part(state, pieces, vane)) / slope[vane] ** 2
             taps = state.whitening.filter[:, output]
             factors = [stuck_factor(read[-n:], implied[-n:], taps, noise[vane], difference) for n in counts]

@@ -28,7 +28,7 @@ BY_CHANCE = 0.1  # correlation of the residuals of one interval with all regress
 CORRELATION = 0.5  # of residuals and regressors; 0.1 to 1 in moderate turbulence, by coefficient and flight
 ALIKE = 3.0  # ratio of information to the mean block's, up to which an interval has the same kind of motion
 LEAST = 20.0  # blocks that a term must have been learned from
-UNMOVED = 1e-6  # information learned of a term, in units of its prior's, below which nothing has been learned
+UNMOVED = 1e-9  # information learned of a term, in units of its prior's, that counts at least
 _EXACT = 1e-9  # standard error of a term that is known exactly
 _RIDGE = 1e-6
 
@@ -39,25 +39,24 @@ def gust_covariance(reference: ReferenceModel, information: Array) -> Array:
     ``information`` (D, D) is the mean information of a block of the interval.
     """
     terms = reference.terms
-    learned_from = np.diag(reference.blocks) >= LEAST
-    moved = np.diag(reference.J) * np.maximum(reference.errors, _EXACT) ** 2 > UNMOVED
-    slopes = np.flatnonzero((terms.output >= 0) & ~terms.of("0") & learned_from & moved)
+    slopes = np.flatnonzero((terms.output >= 0) & ~terms.of("0") & (np.diag(reference.blocks) >= LEAST))
     if not slopes.size:
         return np.zeros_like(information)
     count = np.sqrt(np.maximum(np.diag(reference.blocks), 1.0))
-    learned = _of_slopes(reference.J / np.outer(count, count), terms, slopes)
+    least = UNMOVED / np.maximum(reference.errors, _EXACT) ** 2  # of what has never moved
+    learned = _of_slopes((reference.J + np.diag(least)) / np.outer(count, count), terms, slopes)
     scale = 1.0 / np.sqrt(np.diag(learned))
     root = np.linalg.inv(np.linalg.cholesky(learned * np.outer(scale, scale) + _RIDGE * np.eye(slopes.size)))
     root = root * scale
     times, axes = np.linalg.eigh(root @ _of_slopes(information, terms, slopes) @ root.T)
     unshared = np.maximum(1.0 - ALIKE / np.maximum(times, ALIKE), 0.0)
     shift = CORRELATION * (root.T @ axes) * unshared
-    moves = np.zeros((len(information), slopes.size))
-    moves[slopes] = shift
+    moved = np.zeros((len(information), slopes.size))
+    moved[slopes] = shift
     for output in set(terms.output[slopes].tolist()):  # the offset compensates for it, see ``model_prior``
         mine = terms.output[slopes] == output
-        moves[terms.offset_of(output)] = -reference.regressors[slopes[mine]] @ shift[mine]
-    return np.asarray(moves @ moves.T)
+        moved[terms.offset_of(output)] = -reference.regressors[slopes[mine]] @ shift[mine]
+    return np.asarray(moved @ moved.T)
 
 
 def usual_size_in_gusts(whole: NDArray[np.bool_], usual: Array, blocks: int) -> Array:
