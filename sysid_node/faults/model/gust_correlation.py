@@ -44,7 +44,8 @@ def gust_covariance(reference: ReferenceModel, information: Array) -> Array:
         return np.zeros_like(information)
     count = np.sqrt(np.maximum(np.diag(reference.blocks), 1.0))
     least = UNMOVED / np.maximum(reference.errors, _EXACT) ** 2  # of what has never moved
-    learned = _of_slopes((reference.J + np.diag(least)) / np.outer(count, count), terms, slopes)
+    lacking = np.maximum(least - np.diag(reference.J), 0.0)
+    learned = _of_slopes((reference.J + np.diag(lacking)) / np.outer(count, count), terms, slopes)
     scale = 1.0 / np.sqrt(np.diag(learned))
     root = np.linalg.inv(np.linalg.cholesky(learned * np.outer(scale, scale) + _RIDGE * np.eye(slopes.size)))
     root = root * scale
