@@ -238,6 +238,7 @@ def _renew(state: MonitorState, now: Block) -> None:
         each,
         Shifts([hypothesis.shift for hypothesis in each]),
         prior,
+        np.asarray(np.linalg.inv(prior.precision)),
         {vane: (variances[vane], added @ believed) for vane, added in noise.items()},
     )
 

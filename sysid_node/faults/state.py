@@ -58,6 +58,7 @@ class FaultHypotheses:
     each: list[Hypothesis]
     shifts: Shifts  # of each
     prior: ModelPrior  # of the model without a fault
+    covariance: Array  # (D, D) of the prior
     flattened: dict[str, tuple[float, Array]]  # by vane: its noise's variance, and (D,) what that takes from the score
 
 

@@ -41,8 +41,7 @@ def verdict_on(flight: Path, aircraft: str) -> FaultVerdict:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("aircraft", ["cdrw", "cdfp", "kestrel"])
-@pytest.mark.parametrize("table", [False, True], ids=["bag", "table"])
+@pytest.mark.parametrize(("aircraft", "table"), [("cdrw", True), ("cdfp", False), ("kestrel", False)])
 def test_sensors_without_noise_are_no_fault(tmp_path: Path, aircraft: str, table: bool) -> None:
     """Residuals are model errors alone, which prove a fault when they are compared with themselves."""
     flight = simulated(tmp_path, aircraft, *MANOEUVRE, "--noise", "0", "--seed", "3")
@@ -51,31 +50,31 @@ def test_sensors_without_noise_are_no_fault(tmp_path: Path, aircraft: str, table
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 41])
-def test_estimates_that_are_adopted_in_still_air_are_no_fault(tmp_path: Path, seed: int) -> None:
+def test_estimates_that_are_adopted_in_still_air_are_no_fault(tmp_path: Path) -> None:
     """What was learned before was about another offset, which counted as a change by hundreds of standard errors."""
-    flight = simulated(tmp_path, "cdrw", *MANOEUVRE, "--seed", str(seed))
+    flight = simulated(tmp_path, "cdrw", *MANOEUVRE, "--seed", "41")
     found = verdict_on(as_table(flight, "cdrw"), "cdrw")
     assert not found.episodes, found.sentences
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [28, 42])
-def test_the_size_of_a_fault_in_still_air_is_from_the_whole_of_it(tmp_path: Path, seed: int) -> None:
+def test_the_size_of_a_fault_in_still_air_is_from_the_whole_of_it(tmp_path: Path) -> None:
     """An onset that is one block late puts the first block with the fault into the model without it."""
     lost = "control_effectiveness_loss:elevator=0.4:onset=34"
-    flight = simulated(tmp_path, "cdrw", *MANOEUVRE, "--seed", str(seed), "--effect", lost)
+    flight = simulated(tmp_path, "cdrw", *MANOEUVRE, "--seed", "42", "--effect", lost)
     (episode,) = verdict_on(as_table(flight, "cdrw"), "cdrw").episodes
     assert (episode.fault.kind, episode.fault.part) == (LOSS, "elevator")
     assert episode.fault.lower <= 0.4 <= episode.fault.upper
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise", ["0", "1"])
-def test_a_file_that_is_wrong_is_no_fault(tmp_path: Path, noise: str) -> None:
-    """All derivatives are off by 2.5 tolerances, and the first manoeuvre comes after the monitor has learned."""
+def test_a_file_that_is_wrong_is_no_fault(tmp_path: Path) -> None:
+    """All derivatives are off by 2.5 tolerances, and the first manoeuvre comes after the monitor has learned.
+
+    Without noise this is where least is needed for a contradiction. Some surfaces have never moved before.
+    """
     late = "3211:elevator:start=24 + 3211:aileron:start=31 + 3211:rudder:start=38"
-    flown = ("--manoeuvre", late, "--noise", noise, "--seed", "2", "--duration", "50")
+    flown = ("--manoeuvre", late, "--noise", "0", "--seed", "2", "--duration", "50")
     flight, random = simulated(tmp_path, "cdrw", *flown), np.random.default_rng(1)
     aircraft = load_aircraft("cdrw")
     guessed = {

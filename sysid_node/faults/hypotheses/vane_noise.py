@@ -86,7 +86,8 @@ def readings(state: MonitorState, pieces: Sequence[WhitenedBlock], shift: Array)
         size = state.whitening.unmix[output, output] * slope * np.sqrt(1.0 + taps @ taps)
         read = np.array([piece.block.air[column] for piece in pieces])
         off = np.array([piece.residual[output] / piece.block.regressors[OFFSET] for piece in pieces])
-        left = np.array([piece.whitened[output] - piece.design[output] @ shift for piece in pieces])
+        left = np.array([piece.whitened[output] for piece in pieces])
+        left -= np.array([piece.design[output] for piece in pieces]) @ shift
         found[vane] = VaneReadings(read, off / slope, left / size)
     return found
 

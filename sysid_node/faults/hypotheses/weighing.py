@@ -84,11 +84,8 @@ def onsets(state: MonitorState, counts: Sequence[int], sound: int) -> list[Fligh
         if n >= ENOUGH:
             before = (J[n - 1], v[n - 1])
             precision = base_prior.precision + before[0]
-            score = (
-                before[1]
-                - before[0] @ base_prior.shift
-                + _flattened(state, {vane: known.first(n) for vane, known in read.items()})
-            )
+            flattened = _flattened(state, {vane: known.first(n) for vane, known in read.items()})
+            score = before[1] - before[0] @ base_prior.shift + flattened
             prior = ModelPrior(base_prior.shift + np.linalg.solve(precision, score), precision)
         first = [_begun(piece, late, prior) for late, piece in enumerate(pieces[n : n + ORDER])]
         rest = [total[-1] - total[n + len(first) - 1] for total in (J, v)]
@@ -116,7 +113,8 @@ def _against(
 ) -> FlightInterval:
     """The interval of blocks whose information (D, D) and score (D,) about the reference values are ``sums``."""
     J, v = sums
-    v = v - J @ prior.shift + _flattened(state, readings(state, pieces, prior.shift))
+    known = readings(state, pieces, prior.shift) if len(pieces) >= LONG else {}
+    v = v - J @ prior.shift + _flattened(state, known)
     return FlightInterval(pieces, prior, (J, v), *marginal(J, v, prior.precision))
 
 
@@ -126,9 +124,10 @@ def _flattened(state: MonitorState, known: Mapping[str, VaneReadings]) -> Array:
     In a short interval the bias is at most half a log unit per block, and the noise cannot be estimated from it.
     """
     total = np.zeros(len(state.terms.names))
-    for vane, (variance, score) in state.hypotheses.flattened.items():
-        if (count := known[vane].read.size) >= LONG:
-            total += known[vane].share(variance) * count * score
+    for vane, one in known.items():
+        variance, score = state.hypotheses.flattened[vane]
+        if one.read.size >= LONG:
+            total += one.share(variance) * one.read.size * score
     return total
 
 
@@ -216,8 +215,8 @@ def stuck_vanes(state: MonitorState, pieces: Sequence[WhitenedBlock], counts: Se
 def _unknown_part(state: MonitorState, pieces: Sequence[WhitenedBlock], vane: str) -> float:
     """Variance of what a vane's force depends on besides its angle, as far as the model does not know it."""
     mine = (state.terms.output == VANES[vane][1]) & ~state.terms.of("0") & ~state.terms.of(vane)
-    known = np.linalg.inv(state.hypotheses.prior.precision)[np.ix_(mine, mine)]
+    known = state.hypotheses.covariance[np.ix_(mine, mine)]
     columns = state.terms.column[mine]
     regressors = np.array([piece.block.regressors[columns] / piece.block.regressors[OFFSET] for piece in pieces])
     regressors = regressors - regressors.mean(axis=0)
-    return float(np.einsum("ni,ij,nj->n", regressors, known, regressors).mean())
+    return float(((regressors @ known) * regressors).sum()) / len(pieces)

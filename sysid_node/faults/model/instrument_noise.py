@@ -3,7 +3,7 @@
 A flight of a simulator without noise leaves residuals that are model errors alone: what the aircraft does beyond the
 linear model, or interpolation between messages. They are tiny, but neither random nor normally distributed. Compared
 with themselves they would prove a fault, however small. Therefore instruments count as no more than ``BETTER`` times as
-good as the file says.
+good as the file says they are.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from sysid_node.online.frequency.regression_signals import momentum_matrix
 
 Array = NDArray[np.float64]
 
-BETTER = 2.0
+BETTER = 2.0  # times as good as the file says that instruments may be
 
 
 def least_variances(aircraft: Aircraft, samples: float, period: float) -> Array:
