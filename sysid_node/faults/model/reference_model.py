@@ -143,16 +143,14 @@ def commanded(reference: ReferenceModel) -> set[str]:
     return {name for name, (servo, _) in reference.terms.servos.items() if reference.errors[servo].any()}
 
 
-def learn(
-    reference: ReferenceModel, J: Array, v: Array, chosen: NDArray[np.bool_], noisy: Mapping[str, float] | None = None
-) -> None:
+def learn(reference: ReferenceModel, J: Array, v: Array, chosen: NDArray[np.bool_], noisy: Mapping[str, float]) -> None:
     """Add the information of a block without a fault about the ``chosen`` terms (D,).
 
     ``noisy``: the share of each vane's noise that it has (``hypotheses.vane_noise``).
     """
     both = np.outer(chosen, chosen)
     reference.blocks = KEPT * reference.blocks + both
-    for vane, share in (noisy or {}).items():
+    for vane, share in noisy.items():
         reference.noisy[vane] = KEPT * reference.noisy.get(vane, np.zeros_like(J)) + share * both
     reference.J = KEPT * reference.J + both * J
     reference.v = KEPT * reference.v + chosen * v

@@ -43,7 +43,7 @@ def test_what_was_learned_is_about_the_values_that_are_adopted(name: str) -> Non
     reference.regressors[plain] = np.mean([X.sum(axis=0) for X, _ in blocks], axis=0)[plain]
     every = np.ones(len(reference.terms.names), dtype=bool)
     for X, y in blocks:
-        reference_model.learn(reference, X.T @ X, X.T @ (y - X @ reference.values), every)
+        reference_model.learn(reference, X.T @ X, X.T @ (y - X @ reference.values), every, {})
     d = reference.terms.names.index(name)
     other = IdentifierEstimate(1.2 * float(reference.values[d]) + 0.01, 0.01, valid=True)
     reference_model.receive_estimates(reference, 0.0, IdentifierEstimates({name: other}, {}, changed=False))
