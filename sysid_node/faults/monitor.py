@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.faults.hypotheses.bayes_factors import Shifts, Weighed
+from sysid_node.faults.hypotheses.bayes_factors import Shifts
 from sysid_node.faults.hypotheses.catalogue import hypotheses
 from sysid_node.faults.hypotheses.vane_noise import VANES, noise_variances, readings, shares
 from sysid_node.faults.hypotheses.weighing import (
     LONG,
+    Explanations,
     FlightInterval,
     allowing_for_gusts,
     changed_since,
@@ -32,6 +33,7 @@ from sysid_node.faults.hypotheses.weighing import (
     last_interval,
     onsets,
     promising,
+    sized,
     statistics,
     stuck_vanes,
     weights,
@@ -314,28 +316,29 @@ def _follow(state: MonitorState, alarm: Alarm) -> None:
         alarm.since, alarm.prior = _onset(state, alarm)
     over = changed_since(state, min(max(_since(state, alarm.since), LEAST), len(pieces)), alarm.prior)
     found = explained(state, over, alarm.usual)
-    factors = np.array([*(w.factor for w in found), *stuck_vanes(state, over.pieces)[0]])
+    factors = np.array([*(w.factor for w in found.each), *stuck_vanes(state, over.pieces)[0]])
     remembered = pieces[0].block.time <= alarm.since + PERIOD
     if remembered:
         alarm.place = int(np.argmax(factors))
     if (remembered and factors[alarm.place] > 0.0) or factors[alarm.place] > state.settings.threshold:
-        _name(state, alarm, found, factors)
+        _name(state, alarm, over, found, factors)
     if now - alarm.found > LAG * PERIOD and ((remembered and factors.max() <= 0.0) or _contradicted(state, alarm)):
         state.alarm = state.fault = None
         state.history.pieces.clear()
         state.usual.clear()
 
 
-def _name(state: MonitorState, alarm: Alarm, found: Sequence[Weighed], factors: Array) -> None:
+def _name(state: MonitorState, alarm: Alarm, over: FlightInterval, found: Explanations, factors: Array) -> None:
     """Report the fault at the alarm's place among the hypotheses, which are ``found``, and the stuck vanes."""
     place = alarm.place
     times = Detection(min(alarm.since, alarm.found), alarm.found, _sure(state, factors, place))
-    if place >= len(found):
+    if place >= len(found.each):
         alarm.shift = None
-        state.fault = Fault(VANE_STUCK, list(VANES)[place - len(found)], *(math.nan,) * 3, "", *times)
+        state.fault = Fault(VANE_STUCK, list(VANES)[place - len(found.each)], *(math.nan,) * 3, "", *times)
         return
-    hypothesis, weighed = state.hypotheses.each[place], found[place]
-    alarm.shift = hypothesis.shift.fixed + hypothesis.shift.free @ weighed.size
+    hypothesis = state.hypotheses.each[place]
+    shift, weighed = sized(state, over, found, place)
+    alarm.shift = shift.fixed + shift.free @ weighed.size
     if hypothesis.kind != DAMAGE or state.history.pieces[-1].block.time - alarm.found > (EVERY - 0.5) * PERIOD:
         state.fault = fault_of(hypothesis, weighed, state.terms, times)
 

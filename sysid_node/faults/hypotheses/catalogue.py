@@ -7,12 +7,17 @@ all terms with dynamic pressure. Every surface and sensor has therefore a direct
 terms, by which faults are distinguished. Damage is any shift of the derivatives of an axis. As a simpler hypothesis,
 which needs less evidence, it is a change of stiffness, of damping, or of both, which a shifted mass or the loss of a
 part of the tail causes first.
+
+The shifts by vanes and airspeed are proportional to the error only where it is small: 3 deg of the angle of attack turn
+the lift into a third as much drag again as the tangent says. They are linearised anew about the size that is found.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import math
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +34,8 @@ Array = NDArray[np.float64]
 #: Prior standard deviations: share of a surface's effect, angle of a surface (rad), share of a lag of a servo, share of
 #: dynamic pressure, angle of a vane (rad), share of a derivative.
 LOST, MOVED, SLOWED, PRESSURE, TURNED, CHANGED = 0.5, 0.1, 0.8, 0.5, 0.1, 0.5
+_STEP = 1e-4  # of a size, by which a shift is differentiated
+_LEAST_PRESSURE = 0.01  # times the measured dynamic pressure
 LIMIT = 0.35  # rad, where the aircraft file gives no limit
 _LIFT, _DRAG = COEFFICIENTS.index("CL"), COEFFICIENTS.index("CD")
 
@@ -44,6 +51,7 @@ class Hypothesis:
     whole: bool = False  # all derivatives of an axis, which can fit any change
     measure: tuple[float, ...] = (1.0,)  # the size by one of each free direction; damage has none
     one_sided: bool = False  # its size is never negative
+    of_size: Callable[[float], Array] | None = None  # the shift (D,) by a size, where it is not proportional to it
 
 
 def hypotheses(aircraft: Aircraft, terms: Terms, reference: Array, commanded: Collection[str] = ()) -> list[Hypothesis]:
@@ -56,10 +64,10 @@ def hypotheses(aircraft: Aircraft, terms: Terms, reference: Array, commanded: Co
                 found.append(
                     Hypothesis(SLOWER, name, _slower(name, terms, reference.size), measure=LAGS, one_sided=True)
                 )
-    found.append(Hypothesis(AIRSPEED, "airspeed", _free([_pressure(terms, reference)], [PRESSURE])))
+    found.append(_curved(AIRSPEED, "airspeed", partial(_pressure, terms, reference), PRESSURE))
     for vane in ("alpha", "beta"):
         if terms.of(vane).any():
-            found.append(Hypothesis(VANE_OFFSET, vane, _free([_turned(vane, terms, reference)], [TURNED])))
+            found.append(_curved(VANE_OFFSET, vane, partial(_turned, vane, terms, reference), TURNED))
     for axis, names in _AXES:
         columns = _columns(names, terms)
         if columns.size:
@@ -68,6 +76,23 @@ def hypotheses(aircraft: Aircraft, terms: Terms, reference: Array, commanded: Co
         present = [[terms.names.index(name) for name in names] for names in those if set(names) <= set(terms.names)]
         found += [Hypothesis(DAMAGE, axis, _changed(np.array(columns), terms, reference)) for columns in present]
     return found
+
+
+def linearised(hypothesis: Hypothesis, size: Array) -> Shift:
+    """The shift by a hypothesis, linear about a size (m,) of its free directions."""
+    if hypothesis.of_size is None:
+        return hypothesis.shift
+    return _tangent(hypothesis.of_size, float(size[0]), float(hypothesis.shift.spread[0]))
+
+
+def _curved(kind: str, part: str, of_size: Callable[[float], Array], spread: float) -> Hypothesis:
+    return Hypothesis(kind, part, _tangent(of_size, 0.0, spread), of_size=of_size)
+
+
+def _tangent(of_size: Callable[[float], Array], size: float, spread: float) -> Shift:
+    """The tangent of a shift at a size, with the prior standard deviation of the whole size."""
+    slope = (of_size(size + _STEP) - of_size(size - _STEP)) / (2.0 * _STEP)
+    return Shift(of_size(size) - size * slope, slope[:, None], np.array([spread]))
 
 
 _AXES = (("longitudinal", LONGITUDINAL), ("lateral", LATERAL))
@@ -105,24 +130,29 @@ def _offsets(regressor: str, terms: Terms, reference: Array) -> Array:
     return shift
 
 
-def _pressure(terms: Terms, reference: Array) -> Array:
-    """(D,) the shift if dynamic pressure is twice the measured one; non-dimensional rates change by its root."""
-    share = np.array([0.5 if r in RATES else 1.0 for r in terms.regressors])
-    return np.asarray(share * reference)
+def _pressure(terms: Terms, reference: Array, size: float) -> Array:
+    """(D,) the shift where dynamic pressure is ``1 + size`` times the measured one.
+
+    Non-dimensional rates change by its root.
+    """
+    times = max(1.0 + size, _LEAST_PRESSURE)
+    share = np.array([math.sqrt(times) if r in RATES else times for r in terms.regressors])
+    return np.asarray((share - 1.0) * reference)
 
 
-def _turned(vane: str, terms: Terms, reference: Array) -> Array:
-    """(D,) the shift if the true angle is one radian above the measured one.
+def _turned(vane: str, terms: Terms, reference: Array, size: float) -> Array:
+    """(D,) the shift where the true angle is ``size`` (rad) above the measured one.
 
     An alpha error also rotates lift and drag.
     """
-    shift = _offsets(vane, terms, reference)
+    true = reference + size * _offsets(vane, terms, reference)
+    seen = true.copy()
     if vane == "alpha":
-        for output, other, sign in ((_LIFT, _DRAG, 1.0), (_DRAG, _LIFT, -1.0)):
+        for output, other, sine in ((_LIFT, _DRAG, math.sin(size)), (_DRAG, _LIFT, -math.sin(size))):
             for d in np.flatnonzero(terms.output == output).tolist():
                 twin = (terms.output == other) & (terms.column == terms.column[d])
-                shift[d] += sign * reference[twin].sum()
-    return shift
+                seen[d] = math.cos(size) * true[d] + sine * true[twin].sum()
+    return np.asarray(seen - reference)
 
 
 def _changed(columns: NDArray[np.intp], terms: Terms, reference: Array) -> Shift:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.faults.hypotheses.bayes_factors import (
+    Shift,
     Weighed,
     marginal,
     most,
@@ -19,7 +20,7 @@ from sysid_node.faults.hypotheses.bayes_factors import (
     weigh_each,
     weigh_loosely,
 )
-from sysid_node.faults.hypotheses.catalogue import Hypothesis
+from sysid_node.faults.hypotheses.catalogue import Hypothesis, linearised
 from sysid_node.faults.hypotheses.vane_check import stuck_factor
 from sysid_node.faults.hypotheses.vane_noise import VANES, VaneReadings, noise_variances, readings, slopes
 from sysid_node.faults.model import gust_correlation, residual_whitening
@@ -34,6 +35,7 @@ LOOSE = 0.1  # relative difference of a fault from its hypothesis that is allowe
 ENOUGH = 3  # least number of blocks before the onset that refine the prior
 LONG = 20  # blocks, from which on the noise of the vanes is corrected for
 MARGIN = 1.0  # of a log Bayes factor, allowance for rounding
+LINEARISED = 3  # times that a shift is linearised about its size
 LAST_RESORT = 0.1  # share taken off the log Bayes factor of damage of a whole axis, which can fit any change
 
 
@@ -138,19 +140,47 @@ def _begun(piece: WhitenedBlock, late: int, prior: ModelPrior) -> WhitenedBlock:
     return piece._replace(design=A, whitened=b, J=A.T @ A, v=A.T @ b)
 
 
-def explained(state: MonitorState, over: FlightInterval, usual: Array) -> list[Weighed]:
+class Explanations(NamedTuple):
+    """Each hypothesis weighed, and the variance of the residuals by which it was."""
+
+    each: list[Weighed]
+    scale: float  # relative to the variance that was assumed in the whitening
+
+
+def explained(state: MonitorState, over: FlightInterval, usual: Array) -> Explanations:
     """Each hypothesis with an allowance for its simplicity (``weigh_loosely``), by the best one's residual variance."""
     first = weights(state, over, usual)
     best = min(excess(state, over, place, weighed) for place, weighed in enumerate(first))
     scale = max(float(usual.max()), best, 1.0)
     found = []
     for hypothesis, weighed in zip(state.hypotheses.each, first, strict=True):
-        moved = hypothesis.shift.fixed + hypothesis.shift.free @ weighed.size
-        one = weigh_loosely(*over.whole, hypothesis.shift, over.prior.precision, LOOSE * moved, scale)
+        one = _loosely(over, over.prior.precision, hypothesis.shift, weighed.size, scale)
         if hypothesis.whole:
             one = replace(one, factor=one.factor - LAST_RESORT * abs(one.factor))
         found.append(one)
-    return _possible(state, found)
+    return Explanations(_possible(state, found), scale)
+
+
+def _loosely(over: FlightInterval, precision: Array, shift: Shift, size: Array, scale: float) -> Weighed:
+    """A shift weighed where a fault of about this size (m,) may differ from it."""
+    return weigh_loosely(*over.whole, shift, precision, LOOSE * (shift.fixed + shift.free @ size), scale)
+
+
+def sized(state: MonitorState, over: FlightInterval, found: Explanations, place: int) -> tuple[Shift, Weighed]:
+    """The shift by a fault, linear about its size, and the size.
+
+    Gusts may have biased the slopes, which matters where the mean motion is another than before the fault.
+    """
+    motion = np.array([piece.block.regressors for piece in over.pieces])
+    mean, plain = np.zeros(len(state.terms.names)), state.terms.derivatives
+    mean[plain] = (motion / motion[:, [OFFSET]]).mean(axis=0)[state.terms.column[plain]]
+    offsets = gust_correlation.offset_covariance(state.reference, mean)
+    precision = np.asarray(np.linalg.inv(np.linalg.inv(over.prior.precision) + offsets))
+    hypothesis, weighed = state.hypotheses.each[place], found.each[place]
+    for _ in range(LINEARISED):
+        shift = linearised(hypothesis, weighed.size)
+        weighed = _loosely(over, precision, shift, weighed.size, found.scale)
+    return shift, weighed
 
 
 def statistics(state: MonitorState, over: FlightInterval) -> Array:

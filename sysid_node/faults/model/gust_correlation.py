@@ -10,6 +10,9 @@ from, only 1 / lambda of the shift remains, and a contradiction of this size is 
 that was learned from has deliberate motion, too, an interval with up to a few times its mean information counts as the
 same kind.
 
+A fault may also change the mean motion. Then the shift acts as one of the offset, whatever the information
+(``offset_covariance``), and the size of a fault that changes offsets is no better known than that.
+
 In addition, a few gusts in a row have a correlation by chance. The dozen derivatives of a whole axis fit it whatever
 its direction (``usual_size_in_gusts``).
 """
@@ -38,14 +41,10 @@ def gust_covariance(reference: ReferenceModel, information: Array) -> Array:
 
     ``information`` (D, D) is the mean information of a block of the interval.
     """
-    terms = reference.terms
-    slopes = np.flatnonzero((terms.output >= 0) & ~terms.of("0") & (np.diag(reference.blocks) >= LEAST))
+    terms, slopes = reference.terms, _learned_slopes(reference)
     if not slopes.size:
         return np.zeros_like(information)
-    count = np.sqrt(np.maximum(np.diag(reference.blocks), 1.0))
-    least = UNMOVED / np.maximum(reference.errors, _EXACT) ** 2  # of what has never moved
-    lacking = np.maximum(least - np.diag(reference.J), 0.0)
-    learned = _of_slopes((reference.J + np.diag(lacking)) / np.outer(count, count), terms, slopes)
+    learned = _learned_by_block(reference, slopes)
     scale = 1.0 / np.sqrt(np.diag(learned))
     root = np.linalg.inv(np.linalg.cholesky(learned * np.outer(scale, scale) + _RIDGE * np.eye(slopes.size)))
     root = root * scale
@@ -58,6 +57,39 @@ def gust_covariance(reference: ReferenceModel, information: Array) -> Array:
         mine = terms.output[slopes] == output
         moved[terms.offset_of(output)] = -reference.regressors[slopes[mine]] @ shift[mine]
     return np.asarray(moved @ moved.T)
+
+
+def offset_covariance(reference: ReferenceModel, regressors: Array) -> Array:
+    """(D, D) the covariance of the offsets due to the biased slopes, where the mean motion is another one.
+
+    ``regressors`` (D,) are the terms' means in an interval. Offsets were learned at the usual mean motion. About
+    another one, as an aircraft has whose surface is stuck, a shift of the slopes acts as a shift of the offset. All
+    slopes of a coefficient together share the correlation with its residual.
+    """
+    terms, slopes = reference.terms, _learned_slopes(reference)
+    if not slopes.size:
+        return np.zeros((regressors.size, regressors.size))
+    block = np.linalg.inv(_learned_by_block(reference, slopes))
+    away = np.zeros((regressors.size, slopes.size))
+    for output in set(terms.output[slopes].tolist()):
+        mine = terms.output[slopes] == output
+        change = (regressors - reference.regressors)[slopes[mine]]
+        away[terms.offset_of(output), mine] = CORRELATION * change / np.sqrt(mine.sum())
+    return np.asarray(away @ block @ away.T)
+
+
+def _learned_slopes(reference: ReferenceModel) -> NDArray[np.intp]:
+    """The slopes of coefficients that enough blocks were learned of."""
+    enough = np.diag(reference.blocks) >= LEAST
+    return np.flatnonzero((reference.terms.output >= 0) & ~reference.terms.of("0") & enough)
+
+
+def _learned_by_block(reference: ReferenceModel, slopes: NDArray[np.intp]) -> Array:
+    """Information about some slopes in the mean block that was learned from."""
+    count = np.sqrt(np.maximum(np.diag(reference.blocks), 1.0))
+    least = UNMOVED / np.maximum(reference.errors, _EXACT) ** 2  # of what has never moved
+    lacking = np.maximum(least - np.diag(reference.J), 0.0)
+    return _of_slopes((reference.J + np.diag(lacking)) / np.outer(count, count), reference.terms, slopes)
 
 
 def usual_size_in_gusts(whole: NDArray[np.bool_], usual: Array, blocks: int) -> Array:

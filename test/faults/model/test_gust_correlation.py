@@ -56,6 +56,25 @@ def test_the_shift_leaves_the_mean_as_it_is() -> None:
     assert mean @ allowed @ mean == pytest.approx(0.0, abs=1e-9 * np.abs(allowed).max())
 
 
+def test_another_mean_motion_makes_an_offset_of_the_slopes_bias() -> None:
+    """Residuals of unit variance that correlate with the regressors, in any direction alike, shift the slopes."""
+    state, slopes, said = taught()
+    away = np.array([0.2, -0.1, 0.3])
+    mean = state.reference.regressors.copy()
+    mean[slopes] += away
+    u = np.random.default_rng(3).standard_normal((20000, 3))
+    u /= np.linalg.norm(u, axis=1)[:, None]
+    root = np.linalg.cholesky(np.linalg.inv(said[np.ix_(slopes, slopes)]))
+    offsets = CORRELATION * u @ root.T @ away
+    found = gust_correlation.offset_covariance(state.reference, mean)
+    place = state.terms.offset_of(COEFFICIENTS.index("Cm"))
+    assert found[place, place] == pytest.approx(np.mean(offsets**2), rel=0.03)
+    found[place, place] = 0.0
+    np.testing.assert_array_equal(found, 0.0)
+    usual = gust_correlation.offset_covariance(state.reference, state.reference.regressors)
+    np.testing.assert_array_equal(usual, 0.0)
+
+
 def test_what_was_never_learned_is_not_doubted() -> None:
     state, _ = monitored(2)
     assert not gust_correlation.gust_covariance(state.reference, np.eye(len(state.terms.names))).any()
