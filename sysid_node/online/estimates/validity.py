@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sysid_node.online import status
 from sysid_node.online.alignment import flow_angle_filter
+from sysid_node.online.estimates import roll_mode_exchange
 from sysid_node.online.estimates.current_solution import CurrentSolution
 from sysid_node.online.regression import damping, least_squares, normal_equations
 from sysid_node.online.regression.gust_correlation import MOMENTS
@@ -52,7 +53,8 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
     # an equation with one weak instrument is solved by least squares, which gusts bias
     strengths = latest.instruments.strength.strength[:, None]
     strength = np.where(equations.structure.belongs > 0.0, strengths, np.inf).min(axis=0)
-    objections, squares = _objections(state, latest), student_95(freedom)[c] ** 2
+    swapped = roll_mode_exchange.exchanged(state, latest)
+    objections, squares = _objections(state, latest, swapped), student_95(freedom)[c] ** 2
     factors = latest.instruments.selection_bias_factors
     cautions = np.where(table.offset, factors.max(axis=0)[c], factors[table.unknown, c])
     caution, longest = np.maximum(cautions, 1.0), latest.instruments.anderson_rubin.longest(squares)
@@ -74,14 +76,15 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
         systematic_arms=NORMAL_95**2 * systematic,
         floor=np.maximum(BURIED * latest.total.bias.take(equations.entries.energy), least_squares.TINY),
         fits=np.stack([np.zeros_like(stds), stds, freedom, np.full_like(stds, samples)], axis=1),
-        servos=_of_servos(state, objections),
+        servos=_of_servos(state, objections, swapped),
     )
 
 
-def _of_servos(state: EstimatorState, objections: Codes) -> Codes:
+def _of_servos(state: EstimatorState, objections: Codes, swapped: bool) -> Codes:
     """(m,) the ``objections`` (D,) to the derivatives of a control where none is without: they hold for its servo too.
 
-    A servo's time is told by the equations that the control is in.
+    A servo's time is told by the equations that the control is in. That of the aileron may be ``swapped`` with the roll
+    mode's.
     """
     imperfect, table, layout = state.model.imperfections, state.model.table, state.model.layout
     if imperfect is None:
@@ -91,6 +94,8 @@ def _of_servos(state: EstimatorState, objections: Codes) -> Codes:
         of_it = objections[(regressors[table.unknown] == layout.timed[place]) & ~table.offset]
         if of_it.size and (of_it != status.OK).all():
             found[i] = of_it[-1]
+        if swapped and layout.timed[place] == roll_mode_exchange.CONTROL:
+            found[i] = status.CONVERGING
     return found
 
 
@@ -102,12 +107,18 @@ def _systematic(state: EstimatorState, latest: SegmentSolution) -> Array:
     return np.maximum(found.variance.reshape(-1).take(table.place), 0.0)
 
 
-def _objections(state: EstimatorState, latest: SegmentSolution) -> Codes:
-    """(D,) the status of each by the criteria that change with renewals; a later criterion takes precedence."""
+def _objections(state: EstimatorState, latest: SegmentSolution, swapped: bool) -> Codes:
+    """(D,) the status of each by the criteria that change with renewals; a later criterion takes precedence.
+
+    ``swapped``: see ``roll_mode_exchange``.
+    """
     table, words = state.model.table, state.model.vocabulary
     c = table.coefficient
     objections = np.zeros(c.size, np.uint8)
     objections[_moved_by_servos(state, latest)[c, table.unknown] & ~table.offset] = status.CONVERGING
+    if swapped:
+        rolling = state.equations.structure.coefficients.index(roll_mode_exchange.MOMENT)
+        objections[(c == rolling) & ~table.offset] = status.CONVERGING
     lag = latest.tests.lag
     biased = lag.biased[table.unknown, c] & ~table.offset
     objections[biased] = [words.code(f"{lag.lagging_control[i]} not on time") for i in c[biased].tolist()]
