@@ -12,6 +12,7 @@ from sysid_node.gap.document import document
 from sysid_node.gap.residuals.excited_axes import quiet_motions
 from sysid_node.gap.short_flights.readings import length_of
 from sysid_node.gap.validation.spectral_error import Gap
+from sysid_node.report.sections.gap.remainder import what_remains
 from sysid_node.report.wording.causes import (
     MEASURED_ON,
     WORDS,
@@ -99,7 +100,7 @@ def _doubts(found: Diagnosis) -> list[str]:
     if found.verdict == "ambiguous":
         return ["This flight cannot distinguish the alternatives."]
     if found.verdict == "unknown_effect":
-        return ["A large part remains that none of the known effects predicts."]
+        return [what_remains(found.scores)]
     return ["Most of the difference remains."] if found.size.shrink_percent < 50.0 else []
 
 
