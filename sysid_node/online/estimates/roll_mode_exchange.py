@@ -4,8 +4,8 @@ A roll follows the aileron's command through two lags, the servo's and the roll 
 the servo's time constant come out as L and that of the roll mode as T. A servo of T on an aircraft that rolls with L,
 and whose derivatives are T / L times as large, answers the controls in nearly the same way. Only the form of the
 servo's response, and the motion without the aileron, tell the two apart. The search for another solution
-(``renewal.servo_search``) does not always find it: what has been summed up of the flight holds for a servo that is
-about as late as it was taken to be then.
+(``renewal.servo_search``) does not always find it: in what has been summed up of the flight, the ends of the segments
+hold for a servo that is about as late as it was taken to be then.
 
 So the two are weighed by the aircraft file: by its derivatives of the rolling moment, whose errors have Student's
 distribution as in the search, and by what is believed of the servo. The slopes of the rolling moment count as
