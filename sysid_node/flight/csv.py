@@ -8,7 +8,7 @@ import os
 import stat
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
@@ -28,13 +28,15 @@ LINE_LIMIT = 2**17  # characters
 WRONG_ORDER = 0.02
 
 
-def read_csv(path: str | Path) -> FlightRecord:
+def read_csv(path: str | Path, controls: Collection[str] | None = None) -> FlightRecord:
     """The flight in a CSV file; a column with another name is taken as a further control.
+
+    ``controls``: symbols of the aircraft's controls, where it is known; another column is then not used.
 
     Samples with values that no aircraft measures, and the few whose time does not increase, are left out and counted in
     ``rejected``. Raises InputError that names file and line where a cell is no number, a row is incomplete or time does
     not increase in many lines, and where units are wrong.
-    Warns (InputWarning) where a column is missing.
+    Warns (InputWarning) where a column is missing, or is not used.
     """
     path = Path(path)
     with _naming(path), _lines(path) as lines:
@@ -42,7 +44,7 @@ def read_csv(path: str | Path) -> FlightRecord:
         names = [name.strip() for name in next(reader, [])]
         if not names:
             raise InputError(f"is empty: no column {TIME!r}, and no other")
-        check_names(names, TIME)
+        check_names(names, TIME, controls)
         rows = [(reader.line_num, *_numbers(names, reader.line_num, row)) for row in reader if row]
         if len(rows) < 2:
             raise InputError(f"{len(rows)} samples; at least 2 are needed")

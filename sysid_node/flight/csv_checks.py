@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from difflib import get_close_matches
 
 import numpy as np
@@ -24,6 +24,8 @@ COLUMN_LIMIT = 1000
 #: Share of samples beyond a limit from which on the unit must be wrong, not the sample.
 WRONG_UNIT = 0.02
 SLOWEST, FASTEST = 1.0, 1e-5  # s from sample to sample
+
+_MOST_NAMED = 4  # columns that a warning names
 
 LONGEST_GAP = 3600.0  # s; beyond it, it is another flight, or the clock was set
 
@@ -56,10 +58,11 @@ _ANGLES = {
 }
 
 
-def check_names(names: Sequence[str], time: str) -> None:
-    """Raise InputError where the columns' names cannot be those of a flight, and warn of missing ones.
+def check_names(names: Sequence[str], time: str, controls: Collection[str] | None = None) -> None:
+    """Raise InputError where the columns' names cannot be those of a flight; warn of missing and of unused ones.
 
-    The warning gives the column that is likely meant by another name.
+    The warning gives the column that is likely meant by another name. ``controls``: symbols of the aircraft's controls;
+    None where any column may be one.
     """
     if len(names) == 1 and (";" in names[0] or "\t" in names[0]):
         raise InputError("cells are not separated by commas; write it with commas, and a point in numbers")
@@ -71,15 +74,21 @@ def check_names(names: Sequence[str], time: str) -> None:
     if twice:
         raise InputError(f"column {twice[0]!r} is there twice; leave one out")
     others = [name for name in names if name not in COLUMNS and name != time]
-    missing = []
+    missing, meant = [], set()
     for column in (name for name in COLUMNS if name not in names):
         alike = likely_name(column, others)
         if alike:
+            meant.add(alike)
             _warn(f"no column {column!r}, but {alike!r}, which is taken for a further control; is it {column!r}?")
         elif column in _EXPECTED:
             missing.append(column)
     if missing:
         _warn(f"no column {', '.join(map(repr, missing))}: taken as not measured")
+    unused = [name for name in others if controls is not None and name not in controls and name not in meant]
+    if unused:
+        more = f" and {len(unused) - _MOST_NAMED} more" if len(unused) > _MOST_NAMED else ""
+        named = ", ".join(map(repr, unused[:_MOST_NAMED]))
+        _warn(f"not used: column {named}{more}; no signal of a flight and no control of the aircraft has this name")
 
 
 def check_time(time: Array) -> None:

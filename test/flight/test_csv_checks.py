@@ -116,6 +116,21 @@ def test_a_dropped_column_is_named(tmp_path):
         read_csv(written(tmp_path, alpha=None, beta=None))
 
 
+def test_a_column_that_nothing_uses_is_named_where_the_aircraft_is_known(tmp_path):
+    zeros = np.zeros(len(flown()))
+    path = written(tmp_path, df=zeros, battery=zeros, dr=None, rudder=zeros)
+    with pytest.warns(InputWarning) as said:
+        read_csv(path, ("de", "da", "df"))
+    (unused,) = [str(one.message) for one in said if "not used" in str(one.message)]
+    assert "column 'battery'; no signal" in unused  # the flap is a control, and of the rudder another line says it
+    path = written(tmp_path, **{f"cell_{n}": zeros for n in range(6)})
+    with pytest.warns(InputWarning, match="'cell_3' and 2 more; no signal"):
+        read_csv(path, ("de", "da", "dr"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_csv(path)  # any column may be a control
+
+
 def test_two_flights_in_one_file_are_refused(tmp_path):
     """A clock that was set from 1970 to 2026 within the flight looks the same."""
     flight = flown()

@@ -99,7 +99,8 @@ def _opened(args: argparse.Namespace, aircraft: Aircraft | None) -> LogFlight:
     if args.autopilot:
         return LogFlight(read_recorded(args.log, adapter_for(args.autopilot, ADAPTERS, settings)), ())
     if content is Content.TABLE:
-        return LogFlight(streams_from_record(read_csv(args.log), aircraft), ())
+        controls = None if aircraft is None else aircraft.control_symbols
+        return LogFlight(streams_from_record(read_csv(args.log, controls), aircraft), ())
     flight = None if other_topics else open_log(args.log, settings, outputs, key)
     if flight is None:
         _refuse_idle(args, content, own=True)

@@ -95,7 +95,7 @@ def open_streams(
         require_known(aircraft.outputs, joint_names(aircraft), f"aircraft {aircraft.name}", key)
         streams = flight_of_log(log, aircraft.outputs, key).streams
     elif is_table(path, topics, frame):
-        return streams_from_record(read_csv(path), aircraft)
+        return streams_from_record(read_csv(path, aircraft.control_symbols), aircraft)
     else:
         streams = read_streams(path, topics, frame)
     require(streams.name, refusal_of_streams(streams))
@@ -125,7 +125,7 @@ def load_flight_record(
     ``carried``: what the actuators' messages, or a table's columns, are ("commands", "positions", or "auto").
     """
     if is_table(path, topics, frame):
-        record = _checked(aircraft, read_csv(path))
+        record = _checked(aircraft, read_csv(path, aircraft.control_symbols))
         if not record.measured("rho"):
             warn_without_density(aircraft, record.name)
         return with_commands(aircraft, record, carried)

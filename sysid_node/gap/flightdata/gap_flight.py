@@ -89,7 +89,7 @@ def load_gap_flight(
     Raises InputError where it is unreadable, lacks a signal or is too short.
     """
     if is_table(path, topics, frame):
-        record = _checked(aircraft, read_csv(path))
+        record = _checked(aircraft, read_csv(path, aircraft.control_symbols))
         rate = 1.0 / float(np.median(np.diff(record.time)))
         return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
     return flight_of_streams(open_streams(path, aircraft, topics, frame), aircraft, str(path), carried)
