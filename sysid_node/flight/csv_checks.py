@@ -79,7 +79,8 @@ def check_names(names: Sequence[str], time: str, controls: Collection[str] | Non
         alike = likely_name(column, others)
         if alike:
             meant.add(alike)
-            _warn(f"no column {column!r}, but {alike!r}, which is taken for a further control; is it {column!r}?")
+            taken = "taken for a further control" if controls is None or alike in controls else "not used"
+            _warn(f"no column {column!r}, but {alike!r}, which is {taken}; is it {column!r}?")
         elif column in _EXPECTED:
             missing.append(column)
     if missing:
@@ -88,7 +89,7 @@ def check_names(names: Sequence[str], time: str, controls: Collection[str] | Non
     if unused:
         more = f" and {len(unused) - _MOST_NAMED} more" if len(unused) > _MOST_NAMED else ""
         named = ", ".join(map(repr, unused[:_MOST_NAMED]))
-        _warn(f"not used: column {named}{more}; no signal of a flight and no control of the aircraft has this name")
+        _warn(f"not used: column {named}{more}; rename it if it is a signal of the flight or a control of the aircraft")
 
 
 def check_time(time: Array) -> None:

@@ -23,7 +23,7 @@ def test_a_stuck_elevator_in_turbulence_is_where_its_interval_says() -> None:
 
 @pytest.mark.slow
 def test_a_large_error_of_a_vane_is_not_judged_by_that_of_a_small_one() -> None:
-    """3 deg turn the lift into more drag than in proportion; a linear shift said 7 % too much."""
+    """By 3 deg the drag does not shift in proportion; a linear shift said 7 % too much."""
     case = case_of("alpha vane off by 3 deg")
     seen = watched(case, "none", SEEDS, "", 50.0)
     assert all(one.names(case) for one in seen)

@@ -121,10 +121,11 @@ def test_a_column_that_nothing_uses_is_named_where_the_aircraft_is_known(tmp_pat
     path = written(tmp_path, df=zeros, battery=zeros, dr=None, rudder=zeros)
     with pytest.warns(InputWarning) as said:
         read_csv(path, ("de", "da", "df"))
-    (unused,) = [str(one.message) for one in said if "not used" in str(one.message)]
-    assert "column 'battery'; no signal" in unused  # the flap is a control, and of the rudder another line says it
+    misspelt, unused = [str(one.message) for one in said]  # the flap is a control, and the rudder is not named twice
+    assert "no column 'dr', but 'rudder', which is not used; is it 'dr'?" in misspelt
+    assert "not used: column 'battery'; rename it" in unused
     path = written(tmp_path, **{f"cell_{n}": zeros for n in range(6)})
-    with pytest.warns(InputWarning, match="'cell_3' and 2 more; no signal"):
+    with pytest.warns(InputWarning, match="'cell_3' and 2 more; rename it"):
         read_csv(path, ("de", "da", "dr"))
     with warnings.catch_warnings():
         warnings.simplefilter("error")

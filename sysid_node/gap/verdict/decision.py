@@ -24,6 +24,13 @@ from numpy.typing import NDArray
 from sysid_node.flight.record import Array
 from sysid_node.gap.thresholds import THRESHOLDS, Thresholds
 
+#: Rules that leave an effect unknown although there are causes, in words.
+OPEN = "the causes close too little of the gap"
+NO_BETTER = "the causes predict no better than the derivatives within their tolerances"
+SMALL_SHARE = "the causes explain too small a share of the gap"
+STRUCTURED = "on some channel more structure is left than the causes remove"
+RESEMBLING = "a well supported effect is misspecified"
+
 
 @dataclass(frozen=True)
 class CauseScores:
@@ -109,7 +116,7 @@ def _rules_without(scores: VerdictScores, thresholds: Thresholds) -> Iterator[tu
     if structured_channels(scores, thresholds).any():
         yield "unknown_effect", "the remainder is structured, and no effect explains it"
     if is_misspecified(scores):
-        yield "unknown_effect", "a well supported effect is misspecified"
+        yield "unknown_effect", RESEMBLING
     if error_needs_cause(scores.simulation, thresholds):
         yield "unknown_effect", "the simulator's error is larger than noise and weather make it"
     yield "no_gap", "nothing that matters is left to explain"
@@ -118,15 +125,15 @@ def _rules_without(scores: VerdictScores, thresholds: Thresholds) -> Iterator[tu
 def _rules_with_causes(scores: VerdictScores, thresholds: Thresholds) -> Iterator[tuple[str, str]]:
     """Rules where at least one cause was kept."""
     if closes_too_little(scores.simulation, thresholds):
-        yield "unknown_effect", "the causes close too little of the gap"
+        yield "unknown_effect", OPEN
     if scores.score_after <= scores.score_before:
-        yield "unknown_effect", "the causes predict no better than the derivatives within their tolerances"
+        yield "unknown_effect", NO_BETTER
     if explained_share(scores, thresholds) < thresholds.verdict.explained:
-        yield "unknown_effect", "the causes explain too small a share of the gap"
+        yield "unknown_effect", SMALL_SHARE
     if structure_exceeds_causes(scores, thresholds):
-        yield "unknown_effect", "on some channel more structure is left than the causes remove"
+        yield "unknown_effect", STRUCTURED
     if is_misspecified(scores):
-        yield "unknown_effect", "a well supported effect is misspecified"
+        yield "unknown_effect", RESEMBLING
     if all(cause.share >= thresholds.verdict.told_apart for cause in scores.causes):
         yield "explained", "every cause is told apart from its alternatives"
     yield "ambiguous", "an alternative would do nearly as well as a cause"

@@ -21,9 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.online.frequency.regression_signals import OFFSET
+from sysid_node.online.regression import mixed_estimation
 from sysid_node.online.regression.damping import DAMPING
-from sysid_node.online.renewal.servo_search import APART, FREEDOM
+from sysid_node.online.regression.information import Information
+from sysid_node.online.renewal.servo_search import APART
 from sysid_node.online.state import EstimatorState, SegmentSolution
+from sysid_node.online.systematic.imperfections import Imperfections
 
 Array = NDArray[np.float64]
 
@@ -36,40 +40,49 @@ PROMPT = 0.01  # s: a servo that is less late than this has no time that the rol
 def exchanged(state: EstimatorState, latest: SegmentSolution) -> bool:
     """Whether the aircraft file speaks for the solution with exchanged time constants."""
     imperfect, found, structure = state.model.imperfections, latest.systematic, state.equations.structure
-    timed = [] if imperfect is None else [state.model.layout.timed[place] for place in imperfect.timed.tolist()]
-    if imperfect is None or found is None or MOMENT not in structure.coefficients or CONTROL not in timed:
+    if imperfect is None or found is None or MOMENT not in structure.coefficients:
         return False
-    c, servo = structure.coefficients.index(MOMENT), timed.index(CONTROL)
+    c, servo = structure.coefficients.index(MOMENT), _place_of_servo(state, imperfect)
     own = {structure.regressors[i]: i for i in structure.unknowns(c).tolist()}
-    late = float(found.servos.lateness[imperfect.timed[servo]])
-    if RATE not in own or late < PROMPT:
+    if servo is None or RATE not in own:
         return False
     theta, variance = (each[:, c] for each in latest.corrected(found))
-    mode = roll_time_constant(state.model.aircraft, float(theta[own[RATE]]))
-    if not math.isfinite(mode) or abs(mode - late) < APART * float(found.errors[servo]):
+    at = imperfect.timed[servo]
+    late = float(found.servos.lateness[at])
+    mode = roll_time_constant(state.model.aircraft, float(theta[own[RATE]]), _mean_pressure(latest.total))
+    if late < PROMPT or not math.isfinite(mode) or abs(mode - late) < APART * float(found.errors[servo]):
         return False
-    expected = float(imperfect.applied.lateness[imperfect.timed[servo]] + imperfect.expected[servo])
-    sigma, times = float(imperfect.sigmas[servo]), mode / late
+    expected = float(imperfect.applied.lateness[at] + imperfect.expected[servo])
     believed, precision = (each[:, c] for each in state.model.prior)
-    told = (precision > 0.0) & (structure.belongs[:, c] > 0.0)
-    tolerance = precision[told] ** -0.5
+    told = np.where(structure.belongs[:, c] > 0.0, precision, 0.0)
 
     def improbability(factor: float, lateness: float) -> float:
-        off = factor * theta[told] - believed[told]
-        squares = off**2 / (tolerance**2 + factor**2 * np.maximum(variance[told], 0.0))
-        of_servo = ((lateness - expected) / sigma) ** 2
-        return of_servo + float((FREEDOM + 1.0) * np.log1p(squares / FREEDOM).sum())
+        of_servo = ((lateness - expected) / float(imperfect.sigmas[servo])) ** 2
+        return of_servo + mixed_estimation.improbability(factor * theta - believed, told, factor**2 * variance)
 
-    return improbability(1.0, late) > improbability(times, mode) + CLEARLY
+    return improbability(1.0, late) > improbability(mode / late, mode) + CLEARLY
 
 
-def roll_time_constant(aircraft: Aircraft, damping: float) -> float:
-    """Time constant (s) of the roll mode by ``Cl_p`` at the reference condition; infinite where it is not damped.
+def _place_of_servo(state: EstimatorState, imperfect: Imperfections) -> int | None:
+    """The place of the aileron among the controls that are not exactly known; None where it is not among them."""
+    timed = [state.model.layout.timed[place] for place in imperfect.timed.tolist()]
+    return timed.index(CONTROL) if CONTROL in timed else None
 
+
+def _mean_pressure(total: Information) -> float:
+    """The flight's mean dynamic pressure over its reference value."""
+    return float(total.integrals[OFFSET]) / total.energy
+
+
+def roll_time_constant(aircraft: Aircraft, damping: float, pressure: float = 1.0) -> float:
+    """Time constant (s) of the roll mode by ``Cl_p``; infinite where it is not damped.
+
+    ``pressure`` is the dynamic pressure over its reference value; the density is the reference's.
     T = 2 V Ixx / (q S b^2 |Cl_p|) (Etkin & Reid, "Dynamics of Flight", 3rd ed. (1996), sec. 6.7).
     """
     if not damping < 0.0:
         return math.inf
     reference, geometry = aircraft.reference, aircraft.geometry
-    force = 0.5 * reference.air_density * reference.airspeed**2 * geometry.S
-    return 2.0 * reference.airspeed * aircraft.inertia.Ixx / (force * geometry.b**2 * -damping)
+    airspeed = reference.airspeed * math.sqrt(pressure)
+    force = 0.5 * reference.air_density * airspeed**2 * geometry.S
+    return 2.0 * airspeed * aircraft.inertia.Ixx / (force * geometry.b**2 * -damping)

@@ -14,6 +14,8 @@ from sysid_node.online.regression.normal_equations import ModelStructure
 
 Array = NDArray[np.float64]
 
+FREEDOM = 4.0  # degrees of freedom of Student's distribution of a derivative about the aircraft file's
+
 
 def believed_derivatives(aircraft: Aircraft, structure: ModelStructure) -> tuple[Array, Array]:
     """(P, C) believed values and their precisions 1 / tolerance^2; precision 0 where the file states no tolerance."""
@@ -25,6 +27,18 @@ def believed_derivatives(aircraft: Aircraft, structure: ModelStructure) -> tuple
             if belief.tolerance:
                 precisions[i, c] = belief.tolerance**-2
     return values, precisions
+
+
+def improbability(off: Array, precisions: Array, variance: Array) -> float:
+    """-2 log p, but for a constant, of estimates that are ``off`` the aircraft file's values.
+
+    ``variance`` is the estimates'. Where the precision is 0 the file says nothing. Student's distribution with few
+    degrees of freedom is believed, for a file is now and then far off.
+    """
+    told = precisions > 0.0
+    tolerated = 1.0 / np.where(told, precisions, 1.0)
+    squares = np.where(told, off * off / (tolerated + np.maximum(variance, 0.0)), 0.0)
+    return float((FREEDOM + 1.0) * np.log1p(squares / FREEDOM).sum())
 
 
 def weighed(

@@ -25,7 +25,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid_node.online.regression import damping
+from sysid_node.online.regression import damping, mixed_estimation
 from sysid_node.online.renewal import segment_solution, servo_steps
 from sysid_node.online.renewal.segment_information import measure_segment
 from sysid_node.online.state import ChangeWatch, EstimatorState, Steps, current_lines
@@ -43,7 +43,6 @@ PROMPT = 0.02  # s: a servo that is later than this may also be taken to be on t
 STEPS = 4  # at most, from there
 SURELY = 2.0  # difference of -2 log p with which a solution is taken for another
 APART = 1.0  # standard errors by which a servo must differ between two solutions to make them two
-FREEDOM = 4.0  # degrees of freedom of Student's distribution of a derivative about the aircraft file's
 NEGLIGIBLE = 1e-3  # probability
 IMPOSSIBLE = 1e6  # -2 log p of a rotation that amplifies itself
 
@@ -131,12 +130,10 @@ def _improbability(state: EstimatorState, found: SystematicErrors, own: Fit, oth
     assert latest is not None
     noise = np.where(other.noise > 0.0, np.minimum(own.noise, other.noise), 0.0)
     expected, precision = state.model.prior  # (P, C)
-    told = (precision > 0.0) & (state.equations.structure.belongs > 0.0)
+    told = np.where(state.equations.structure.belongs > 0.0, precision, 0.0)
     theta, variance = latest.corrected(found)
-    off = theta - expected
-    squares = np.where(told, off * off / (1.0 / np.where(told, precision, 1.0) + np.maximum(variance, 0.0)), 0.0)
+    of_derivatives = mixed_estimation.improbability(theta - expected, told, variance)
     amplified = damping.amplified(state.equations.structure, theta, variance)
-    of_derivatives = float((FREEDOM + 1.0) * np.log1p(squares / FREEDOM).sum())
     return own.cost(replace(own, noise=noise)) + of_derivatives + IMPOSSIBLE * len(amplified)
 
 

@@ -8,6 +8,7 @@ import pytest
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.names import COEFFICIENTS
 from sysid_node.faults.hypotheses.catalogue import Hypothesis, hypotheses, linearised
+from sysid_node.faults.model.lagged_controls import LAGS
 from sysid_node.faults.model.terms import RATES, Terms, design_of, terms
 from sysid_node.faults.types import AIRSPEED, VANE_OFFSET
 from sysid_node.online.frequency.regression_signals import OFFSET, layout
@@ -16,6 +17,7 @@ AIRCRAFT = load_aircraft("cdrw")
 LAYOUT = layout(AIRCRAFT)
 TERMS: Terms = terms(AIRCRAFT, LAYOUT)
 VALUES = TERMS.values
+PROMPT = np.zeros(len(AIRCRAFT.controls) * len(LAGS))  # no control is behind its command
 
 
 def hypothesis(kind: str, part: str) -> Hypothesis:
@@ -30,14 +32,13 @@ def measured(seed: int) -> np.ndarray:
 
 
 def forces(values: np.ndarray, row: np.ndarray) -> np.ndarray:
-    behind = np.zeros(1 + TERMS.column[[s for servo, _ in TERMS.servos.values() for s in servo]].max())
-    return np.asarray(design_of(TERMS, values, row, behind) @ values)
+    return np.asarray(design_of(TERMS, values, row, PROMPT) @ values)
 
 
 def shifted(found: Hypothesis, size: float, row: np.ndarray) -> np.ndarray:
     """The coefficients that the shift predicts of the measured regressors."""
     assert found.of_size is not None
-    return forces(VALUES, row) + design_of(TERMS, VALUES, row, np.zeros(99)) @ found.of_size(size)
+    return forces(VALUES, row) + design_of(TERMS, VALUES, row, PROMPT) @ found.of_size(size)
 
 
 @pytest.mark.parametrize("error", [-0.2, 0.05, 0.3])

@@ -100,7 +100,7 @@ def _doubts(found: Diagnosis) -> list[str]:
     if found.verdict == "ambiguous":
         return ["This flight cannot distinguish the alternatives."]
     if found.verdict == "unknown_effect":
-        return [what_remains(found.scores)]
+        return [what_remains(found.decision, found.scores)]
     return ["Most of the difference remains."] if found.size.shrink_percent < 50.0 else []
 
 

@@ -25,8 +25,9 @@ SCORES = VerdictScores(
 
 
 def said_of(scores: VerdictScores) -> str:
-    assert decide(scores).verdict == "unknown_effect"
-    return what_remains(scores)
+    decided = decide(scores)
+    assert decided.verdict == "unknown_effect"
+    return what_remains(decided, scores)
 
 
 def test_a_gap_that_stays_open_is_said_to_be_large() -> None:
@@ -39,6 +40,15 @@ def test_a_gap_that_is_closed_leaves_no_large_part_but_what_is_left_by_frequency
     one = np.eye(12)[4]  # Cm
     left = {"structure_deviations": 10.0 * one, "structure_share": 0.9 * one, "power_after": 0.01 + 0.1 * one}
     assert said_of(replace(SCORES, **left)).endswith(f"predicts: {percent(0.31)} of the pitching moment.")
+
+
+def test_remainders_that_are_small_by_channel_are_named_when_they_are_much_together() -> None:
+    """None of them is large enough to matter alone: the causes remove a hundredth of all that is not noise."""
+    left = {"structure_deviations": np.full(12, 10.0), "structure_share": np.full(12, 0.9)}
+    powers = {"power_before": np.full(12, 0.0021), "power_after": np.full(12, 0.002)}
+    causes = (replace(SCORES.causes[0], power_removed=np.full(12, 1e-4)),)
+    said = said_of(replace(SCORES, causes=causes, **left, **powers))
+    assert said.count("% of the") == 3
 
 
 def test_an_effect_that_resembles_a_known_one_is_named() -> None:
