@@ -9,8 +9,8 @@ which needs less evidence, it is a change of stiffness, of damping, or of both, 
 part of the tail causes first.
 
 The shifts by vanes and airspeed are proportional to the error only where it is small: by 3 deg of the angle of attack
-the drag coefficient of ``cdrw`` shifts by 0.008 otherwise than the tangent says, which is several times the noise of a
-block. They are linearised anew about the size that is found.
+the drag coefficient of ``cdrw`` shifts by 0.008 otherwise than the tangent says. They are linearised anew about the
+size that is found.
 """
 
 from __future__ import annotations
