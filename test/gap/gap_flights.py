@@ -8,6 +8,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.align import flight_record
 from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
+from sysid_node.gap.selection.fitted_set import FittedSet, Stage
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
@@ -37,3 +38,8 @@ def fly(
     sortie = fly_sortie(simulator, deflections, SortieConditions(effects, turbulence=turbulence, seed=seed))
     record = flight_record(aircraft, FlightSampler(100.0, 100.0, 100.0).record(sortie), 0.2)
     return completed_flight(aircraft, GapFlight(record, 100.0, 100.0, 100.0, source=f"flight {seed}"))
+
+
+def stage_of(*fitted: FittedSet) -> Stage:
+    """A stage of the forward selection in which these sets were likely, and fitted."""
+    return Stage([*fitted], [each.added for each in fitted if each.added])

@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.nuisances import DERIVATIVE_ERROR, Nuisances
-from sysid_node.gap.estimation.spectral_weights import noise_gradient, real_rows, residual_power, weights
+from sysid_node.gap.estimation.spectral_weights import (
+    noise_gradient,
+    real_rows,
+    residual_power,
+    spectral_deviance,
+    weights,
+)
 from sysid_node.gap.residuals.parameter_priors import bounds, prior
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.residuals.windowed_spectra import Complex
@@ -158,6 +164,18 @@ class CandidateFit:
         centre, sigma = prior(self.simulator, self.indices)
         squares = float(np.sum((now / spread) ** 2) + np.sum(((self.values - centre) / sigma) ** 2))
         return -0.5 * squares - self.log_widening
+
+    @property
+    def spectral_deviance(self) -> float:
+        """Minus twice the log likelihood where all unknowns stand, up to a constant, the spectra profiled out."""
+        powers = ((np.abs(flight.residual) ** 2).mean(axis=0) for flight in self.flights)
+        pairs = zip(self.flights, powers, strict=True)
+        return sum(spectral_deviance(flight.model, power, flight.point) for flight, power in pairs)
+
+    @property
+    def deviance(self) -> float:
+        """Minus twice the log posterior density where all unknowns stand, up to the same constant."""
+        return self.spectral_deviance - 2.0 * self.prior_score
 
     @property
     def derivative_places(self) -> list[int]:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised
-from sysid_node.gap.estimation.spectral_weights import residual_power, spectral_deviance
+from sysid_node.gap.estimation.spectral_weights import residual_power
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.residuals.parameter_priors import bounds
 
@@ -36,11 +36,9 @@ def converged(fit: CandidateFit, rounds: int = _ROUNDS) -> CandidateFit:
         problem = VariableProjection(fit, near)
         fit = _one_round(problem)
         residuals = [flight.residual for flight in fit.flights]
-        pairs = list(zip(fit.flights, residuals, strict=True))
+        pairs = zip(fit.flights, residuals, strict=True)
         fit = fit.with_powers([residual_power(flight.model, left, flight.point) for flight, left in pairs])
-        raw = ((flight, (np.abs(left) ** 2).mean(axis=0)) for flight, left in pairs)
-        deviance = sum(spectral_deviance(flight.model, power, flight.point) for flight, power in raw)
-        deviance -= 2.0 * fit.prior_score
+        deviance = fit.deviance
         if deviance < least:
             best, least = fit, deviance
         if not abs(deviance - last) >= _CONVERGED:

@@ -30,7 +30,6 @@ from sysid_node.gap.estimation.spectral_weights import (
     noise_gradient,
     real_rows,
     residual_power,
-    spectral_deviance,
     weights,
 )
 from sysid_node.gap.residuals.excited_axes import commanded_by_window, effective_number
@@ -103,16 +102,13 @@ def whole_flight_evidence(fit: CandidateFit) -> Evidence:
     assert fit.information is not None
     among = np.ix_(fit.uncertain, fit.uncertain)
     (_, after), (_, before) = (np.linalg.slogdet(each[among]) for each in (fit.information, fit.prior_information))
-    residuals = [flight.residual for flight in fit.flights]
-    powers = ((f, (np.abs(residual) ** 2).mean(axis=0)) for f, residual in zip(fit.flights, residuals, strict=True))
-    deviance = sum(spectral_deviance(f.model, power, f.point) for f, power in powers)
     flights = tuple(
-        FlightEvidence(f.model, residual, (exported_parameters(fit, f.point),) * len(window_groups(f.model)))
-        for f, residual in zip(fit.flights, residuals, strict=True)
+        FlightEvidence(f.model, f.residual, (exported_parameters(fit, f.point),) * len(window_groups(f.model)))
+        for f in fit.flights
     )
     count = sum(len(flight.points) for flight in flights)
     prior_score = fit.prior_score + fit.uncertain_log_widening  # ``before`` has the width of these priors already
-    total = -0.5 * deviance + prior_score - 0.5 * float(after - before)
+    total = -0.5 * fit.spectral_deviance + prior_score - 0.5 * float(after - before)
     return Evidence(np.full(count, total / count), flights)
 
 

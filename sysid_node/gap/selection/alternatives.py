@@ -18,7 +18,7 @@ from sysid_node.gap.selection.acceptance import is_accepted
 from sysid_node.gap.selection.calibration import is_flexible
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison
-from sysid_node.gap.selection.fitted_set import FittedSet
+from sysid_node.gap.selection.fitted_set import FittedSet, Stage
 from sysid_node.gap.selection.replacement import Step, are_alike, are_as_stated, next_step
 from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim.model.parameters import stated_parameters
@@ -37,26 +37,26 @@ def replace_stepwise(
     fitter: CandidateFitter,
     base: FittedSet,
     chosen: FittedSet,
-    stages: Sequence[list[FittedSet]],
+    stages: Sequence[Stage],
     always: Sequence[Candidate],
     barred: frozenset[str] = frozenset(),
 ) -> tuple[FittedSet, tuple[CauseAlternatives, ...]]:
     """The explanation after every cause was compared with its alternatives, and these.
 
-    Alternatives are the candidates that were fitted in some stage of the forward selection, and those that are
+    Alternatives are the candidates that were likely in some stage of the forward selection, and those that are
     ``always`` tried; some are ``barred`` by label from taking a cause's place.
     """
-    fitted = [each.added for stage in stages for each in stage if each.added]
-    untried = [candidate for candidate in always if candidate.label not in {each.label for each in fitted}]
-    pool = [*{candidate.label: candidate for candidate in fitted}.values(), *untried]
+    likely = {each.label: each for stage in stages for each in stage.likely}
+    untried = [candidate for candidate in always if candidate.label not in likely]
+    pool = [*likely.values(), *untried]
     for _ in range(THRESHOLDS.search.sweeps):
-        positions = _positions(fitter, base, chosen, stages[0], pool, untried)
+        positions = _positions(fitter, base, chosen, stages[0].fitted, pool, untried)
         scores = [_Position(fitter, base, chosen, each) for each in positions]
         step = next_step(scores, barred)
         if step is None:
             return chosen, positions
         chosen = _after(scores[step.position], step)
-    return chosen, _positions(fitter, base, chosen, stages[0], pool, untried)
+    return chosen, _positions(fitter, base, chosen, stages[0].fitted, pool, untried)
 
 
 def _after(position: _Position, step: Step) -> FittedSet:

@@ -33,7 +33,7 @@ from sysid_node.gap.selection.calibration import (
 )
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.comparison import Comparison, derivative_shift, power_left
-from sysid_node.gap.selection.fitted_set import FittedSet
+from sysid_node.gap.selection.fitted_set import FittedSet, Stage
 from sysid_node.gap.selection.misspecification import misspecification_of
 from sysid_node.gap.selection.retention import (
     CauseTable,
@@ -109,7 +109,7 @@ def select_causes(
     fitter: CandidateFitter,
     base: FittedSet,
     chosen: FittedSet,
-    stages: Sequence[list[FittedSet]],
+    stages: Sequence[Stage],
     always: Sequence[Candidate],
     rejected_before: Sequence[Cause] = (),
 ) -> Selection:

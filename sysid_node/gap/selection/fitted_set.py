@@ -1,8 +1,10 @@
-"""A set of candidates, fitted: what selection compares."""
+"""A set of candidates, fitted: what selection compares. And the sets that a stage of the selection fits."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 from sysid_node.gap.estimation.candidate_fit import CandidateFit
 from sysid_node.gap.estimation.candidates import Candidate
@@ -16,3 +18,15 @@ class FittedSet:
     fit: CandidateFit
     evidence: Evidence
     added: Candidate | None = None
+
+    @cached_property
+    def deviance(self) -> float:
+        """Minus twice the log posterior density, up to a constant that all sets of the same flights share."""
+        return self.fit.deviance
+
+
+class Stage(NamedTuple):
+    """A stage of the forward selection, in which one candidate is added to explanations."""
+
+    fitted: list[FittedSet]  # the larger explanations, the best first
+    likely: list[Candidate]  # candidates that screening found likely, whether they were fitted or not

@@ -36,7 +36,7 @@ from sysid_node.gap.selection.acceptance import (
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter, Progress, in_parallel
 from sysid_node.gap.selection.causes import Cause, Selection, select_causes
 from sysid_node.gap.selection.comparison import Comparison, derivative_shift
-from sysid_node.gap.selection.fitted_set import FittedSet
+from sysid_node.gap.selection.fitted_set import FittedSet, Stage
 from sysid_node.gap.selection.retention import kept_causes
 from sysid_node.gap.selection.screening import best_screened, with_found_starts
 from sysid_node.gap.thresholds import THRESHOLDS
@@ -171,8 +171,8 @@ def attribute(
         structure_left=pooled_overidentification(chosen.fit, held_out),
         causes=causes,
         rejected=rejected,
-        ranking=_ranking(base, stages[0]),
-        first_stage=tuple(stages[0]),
+        ranking=_ranking(base, stages[0].fitted),
+        first_stage=tuple(stages[0].fitted),
         held_out=tuple(held_out),
     )
 
@@ -181,7 +181,7 @@ def _selected_again(
     fitter: CandidateFitter,
     base: FittedSet,
     first: Selection,
-    stages: Sequence[list[FittedSet]],
+    stages: Sequence[Stage],
     candidates: Sequence[Candidate],
     always: Sequence[Candidate],
 ) -> Selection:
@@ -206,20 +206,23 @@ def _selected_again(
 
 def _forward(
     fitter: CandidateFitter, base: FittedSet, start: FittedSet, candidates: Sequence[Candidate], progress: Progress
-) -> tuple[FittedSet, list[list[FittedSet]]]:
-    """The explanation that forward selection from ``start`` ends with, and what each stage fitted, the best first.
+) -> tuple[FittedSet, list[Stage]]:
+    """The explanation that forward selection from ``start`` ends with, and its stages.
 
     In each stage candidates are added to the best explanations of the stage before, of which the best need not be part
     of the best larger one. It goes on as long as a candidate is accepted, and the larger explanation may also take the
-    best smaller one's place: what mends a poor explanation need not be worth another cause.
+    best smaller one's place: what mends a poor explanation need not be worth another cause. What one step brings no
+    further than the best explanation so far is not fitted.
     """
-    best, frontier, stages = start, [start], list[list[FittedSet]]()
+    best, frontier, stages = start, [start], list[Stage]()
     begun = len(start.fit.candidates)
     for count, (width, most) in enumerate(THRESHOLDS.search.stages[begun:]):
         pairs = fitter.screen_upon(frontier[:width], candidates, _share_of(progress, count))
-        fitted = fitter.fit_screened(best_screened(pairs, most), _share_of(progress, count))
+        likely = best_screened(pairs, most)
+        promising = [pair for pair in likely if pair.screened.deviance < best.deviance]
+        fitted = fitter.fit_screened(promising, _share_of(progress, count))
         candidates = with_found_starts(candidates, [pair.screened for pair in pairs])
-        stages.append([larger for _, larger in fitted])
+        stages.append(Stage([larger for _, larger in fitted], [pair.screened.candidate for pair in likely]))
         accepted = in_parallel(partial(is_better, base, best), fitted, lambda share: None)
         better = [larger for (_, larger), stands in zip(fitted, accepted, strict=True) if stands]
         if not better:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sysid_node.gap.estimation.checkpoint import Checkpoint
+from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.selection.candidate_fitter import CandidateFitter
 from sysid_node.gap.selection.screening import Screened, ScreenedPair
 
@@ -75,3 +76,26 @@ def test_screening_leaves_infinitely_much_where_no_numbers_come(late) -> None:
     endless = replace(candidates["command_delay"], starts=((np.nan,),))
     (found,) = CandidateFitter(fitter.nuisances, Checkpoint()).screen(base, [endless], silent)
     assert found.deviance == np.inf and found.candidate is endless
+
+
+def test_upon_an_explanation_that_is_far_behind_only_what_may_catch_up_is_screened(late) -> None:
+    """Truth: late commands. Without them another inertia leaves much, of which a thrust can remove nothing."""
+    known, base, candidates = late
+    fitter = CandidateFitter(known.nuisances, Checkpoint())
+    fitter.fit_set(base.fit, [])
+    wanted = [candidates[label] for label in ("command_delay", "inertia_error", "thrust_scale")]
+    fitter.screen_upon([base], wanted, silent)
+    best, behind = (fitter.add_candidate(base, each) for each in wanted[:2])
+    pairs = fitter.screen_upon([best, behind], wanted, silent)
+    tried = {(pair.explanation.added.label, pair.screened.candidate.label) for pair in pairs}
+    assert behind.deviance - best.deviance > 100.0
+    assert {added for explanation, added in tried if explanation == "command_delay"} == {"inertia_error", "thrust_scale"}
+    assert ("inertia_error", "thrust_scale") not in tried
+    assert "command_delay" in fitter.screened[frozenset({"inertia_error"})]
+
+
+def test_the_deviance_of_a_fit_is_that_which_screening_compares_with(late) -> None:
+    """By another route: nuisance parameters that are projected out have nowhere better to go where a fit has ended."""
+    fitter, base, candidates = late
+    for fitted in (base, fitter.add_candidate(base, candidates["command_delay"])):
+        assert fitted.deviance == pytest.approx(VariableProjection(fitted.fit).deviance(fitted.fit.values), abs=0.3)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gap_flights import stage_of
 
 from sysid_node.gap.selection.calibration import calibrated_probability
 from sysid_node.gap.selection.causes import select_causes, variance_by_alternatives
@@ -16,7 +17,7 @@ def selected(late):
     """Causes of late commands, where forward selection ended with a lag that resembles them."""
     fitter, base, candidates = late
     lag = fitter.add_candidate(base, candidates["actuator_lag"])
-    return select_causes(fitter, base, lag, [[lag]], [candidates["command_delay"]])
+    return select_causes(fitter, base, lag, [stage_of(lag)], [candidates["command_delay"]])
 
 
 @pytest.mark.slow
@@ -32,7 +33,7 @@ def test_what_was_doubted_before_does_not_come_back(selected, late) -> None:
     fitter, base, candidates = late
     _, (cause,), _ = selected
     lag = fitter.add_candidate(base, candidates["actuator_lag"])
-    chosen, causes, rejected = select_causes(fitter, base, lag, [[lag]], [candidates["command_delay"]], [cause])
+    chosen, causes, rejected = select_causes(fitter, base, lag, [stage_of(lag)], [candidates["command_delay"]], [cause])
     assert rejected[0] is cause
     assert "command_delay" not in chosen.fit.effects | {each.candidate.effect for each in causes}
 
@@ -41,7 +42,7 @@ def rejected_for_its_equation(fitted):
     """Late commands, as if their equation had been found wrong: well supported, and rejected."""
     fitter, base, candidates = fitted
     commands = fitter.add_candidate(base, candidates["command_delay"])
-    _, (cause,), _ = select_causes(fitter, base, commands, [[commands]], [])
+    _, (cause,), _ = select_causes(fitter, base, commands, [stage_of(commands)], [])
     return replace(cause, evidence=replace(cause.evidence, misspecification=1.0))
 
 
@@ -55,7 +56,7 @@ def test_a_flexible_effect_is_not_more_probable_because_what_it_imitates_was_rej
         cause = replace(cause, evidence=replace(cause.evidence, log_bayes_factor=0.0, by_tolerances=0.0))
     imitator = fitter.add_candidate(base, candidates["inertia_error"])
     stage = [imitator, fitter.add_candidate(base, candidates["command_delay"])]
-    chosen, causes, _ = select_causes(fitter, base, imitator, [stage], [], [cause])
+    chosen, causes, _ = select_causes(fitter, base, imitator, [stage_of(*stage)], [], [cause])
     assert chosen.fit.effects == {each.candidate.effect for each in causes} == kept
 
 
@@ -65,7 +66,7 @@ def test_what_is_there_besides_is_no_imitation(mistaken) -> None:
     fitter, base, candidates = mistaken
     shift = fitter.add_candidate(base, candidates["cg_shift"])
     stage = [shift, fitter.add_candidate(base, candidates["command_delay"])]
-    _, causes, rejected = select_causes(fitter, base, shift, [stage], [], [rejected_for_its_equation(mistaken)])
+    _, causes, rejected = select_causes(fitter, base, shift, [stage_of(*stage)], [], [rejected_for_its_equation(mistaken)])
     (cause,) = (each for each in (*causes, *rejected) if each.candidate.effect == "cg_shift")
     assert cause.imitation < 1e-6
 
