@@ -1,8 +1,8 @@
-"""Sizes of causes that are held at the aircraft file's values, because the flight does not show that they differ.
+"""Fits with some unknowns held at the aircraft file's values, because the flight does not show that they differ.
 
 A cause has all the parameters of its effect: a shift of the centre of gravity along three axes, six scales of an IMU.
 Mostly one of them is really off. The others are fitted to what no model describes, and another flight is then predicted
-worse.
+worse. The same holds for derivatives beside a cause.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, stepped
@@ -46,16 +47,39 @@ def insignificant_sizes(fit: CandidateFit, errors: Array) -> tuple[int, ...]:
 
 
 def restricted(fit: CandidateFit, held: Sequence[int]) -> CandidateFit:
-    """The fit with these entries of its sizes at the aircraft file's values, and all else where it is best then.
+    """The fit with these entries of its sizes at the aircraft file's values, and all else where it is best then."""
+    return _moved(fit, *_sizes_to_file(fit, held))
+
+
+def beside_file_derivatives(fit: CandidateFit, held: Sequence[int] = ()) -> CandidateFit:
+    """The fit with the derivatives at the aircraft file's values, and all else where it is best then.
+
+    Sizes are correlated with the derivatives that were fitted with them: those of one belong to those of the other.
+    Derivatives that are a cause stay free. These entries of the sizes are ``held`` at the file's values, too.
+    """
+    shared = [i for i, s in zip(fit.nuisances.indices, fit.nuisances.shared, strict=True) if s]
+    derivatives = np.array([k for k in fit.derivative_places if shared[k] not in fit.widened], int)
+    places, step = _sizes_to_file(fit, held)
+    places = np.append(places, len(fit.indices) + derivatives)
+    return _moved(fit, places, np.append(step, -fit.stacked[0][derivatives]))
+
+
+def _sizes_to_file(fit: CandidateFit, held: Sequence[int]) -> tuple[NDArray[np.intp], Array]:
+    """Places among the unknowns of these entries of the sizes, and the step that takes them to the file's values."""
+    places = np.array([fit.indices.index(i) for i in held], int)
+    return places, fit.simulator.neutral()[list(held)] - fit.values[places]
+
+
+def _moved(fit: CandidateFit, places: NDArray[np.intp], by: Array) -> CandidateFit:
+    """The fit after a step of the unknowns at these ``places``, and all else where it is best then.
 
     Restricted least squares (Seber & Lee (2003), Linear Regression Analysis, sect. 3.8.1). The information stays that
     of the fit in which nothing is held: the standard errors do not forget that it was not known before.
     """
     assert fit.information is not None
-    places = np.array([fit.indices.index(i) for i in held], int)
     free = np.setdiff1d(np.arange(fit.information.shape[0]), places)
     step = np.zeros(fit.information.shape[0])
-    step[places] = fit.simulator.neutral()[list(held)] - fit.values[places]
+    step[places] = by
     normal, right = fit.information[np.ix_(free, free)], fit.information[np.ix_(free, places)] @ step[places]
     step[free] = -np.linalg.solve(normal, right)
     return replace(linearised(stepped(fit, step)), information=fit.information)

@@ -19,7 +19,7 @@ from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, Candid
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, Nuisances
 from sysid_node.gap.estimation.predictive_density import probabilities
-from sysid_node.gap.estimation.restriction import insignificant_sizes, restricted
+from sysid_node.gap.estimation.restriction import beside_file_derivatives, insignificant_sizes, restricted
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.instruments.overidentification import (
     OveridentificationTest,
@@ -95,8 +95,8 @@ class Attribution:
         return replace(self, corrected=linearised(self.base.fit.at(neutral)))
 
     def with_file_derivatives(self) -> Attribution:
-        """The same causes with the file's own derivatives."""
-        fit, neutral = self.corrected, self.corrected.simulator.neutral()
+        """The same causes with the file's own derivatives, and the sizes that belong to these."""
+        fit, neutral = beside_file_derivatives(self.corrected, self.held), self.corrected.simulator.neutral()
         entries, points = [*fit.indices, *fit.widened], [neutral.copy() for _ in fit.flights]
         for point, flight in zip(points, fit.flights, strict=True):
             point[entries] = flight.point[entries]

@@ -1,4 +1,4 @@
-"""Sizes held at the file's values. Truth: least squares without the columns of what is held, and drawn noise."""
+"""Sizes and derivatives held at the file's values. Truth: least squares without the columns of what is held, and drawn noise."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.estimation.restriction import insignificant_sizes, restricted
+from sysid_node.gap.estimation.restriction import beside_file_derivatives, insignificant_sizes, restricted
 
 
 @pytest.fixture(scope="module")
@@ -62,21 +62,51 @@ def test_of_two_sizes_that_stand_in_for_each_other_one_is_significant(start) -> 
     assert insignificant_sizes(unlike, np.sqrt(np.diag(unlike.covariance))[:6]) == (fit.indices[1],)
 
 
+def _after_one_step(start: CandidateFit) -> CandidateFit:
+    """The fit after one step of least squares, linearised where it started."""
+    (flight,) = start.flights
+    point, chosen, step = flight.point.copy(), list(start.indices), _least_squares(start, [])
+    point[chosen] += step[: len(chosen)]
+    point[list(flight.nuisances.indices)] += step[len(chosen) + flight.nuisances.places(0)]
+    return start.at([point])
+
+
+def _least_squares(start: CandidateFit, held: list[int]) -> np.ndarray:
+    """The step (unknowns,) of least squares over all unknowns but those at the places that are held."""
+    (flight,) = start.flights
+    J, r = flight.slopes.reshape(-1, flight.slopes.shape[2]), flight.rows.ravel()
+    free = np.setdiff1d(np.arange(J.shape[1]), held)
+    step = np.zeros(J.shape[1])
+    step[free] = np.linalg.solve(start.information[np.ix_(free, free)], (J.T @ r)[free])
+    return step
+
+
 def test_all_else_is_where_it_is_best_without_what_is_held(start) -> None:
     """One step of restricted least squares lands where least squares over the other unknowns does."""
-    fit = replace(start, information=start.information)
-    (flight,) = fit.flights
-    J, r = flight.slopes.reshape(-1, flight.slopes.shape[2]), flight.rows.ravel()
-    whole = np.linalg.solve(fit.information, J.T @ r)
-    point = flight.point.copy()
-    chosen = list(fit.indices)
-    point[chosen] += whole[: len(chosen)]
-    point[list(flight.nuisances.indices)] += whole[len(chosen) + flight.nuisances.places(0)]
-    held = fit.indices[:3]
-    there = restricted(fit.at([point]), held)
-    free = np.arange(3, whole.size)
-    alone = np.linalg.solve(fit.information[np.ix_(free, free)], (J.T @ r)[free])
+    there = restricted(_after_one_step(start), start.indices[:3])
+    scale = np.sqrt(np.diag(start.covariance))[:6]
     np.testing.assert_array_equal(there.values[:3], 0.0)
-    scale = np.sqrt(np.diag(fit.covariance))
-    np.testing.assert_allclose(there.values[3:] / scale[3:6], alone[:3] / scale[3:6], atol=1e-6)
-    np.testing.assert_array_equal(there.information, fit.information)
+    np.testing.assert_allclose(there.values / scale, _least_squares(start, [0, 1, 2])[:6] / scale, atol=1e-6)
+    np.testing.assert_array_equal(there.information, start.information)
+
+
+def test_beside_the_files_derivatives_sizes_are_those_of_least_squares_without_derivatives(start) -> None:
+    fitted = _after_one_step(start)
+    there = beside_file_derivatives(fitted)
+    places = len(start.indices) + np.array(start.derivative_places)
+    scale = np.sqrt(np.diag(start.covariance))[:6]
+    assert np.abs(fitted.stacked[0][fitted.derivative_places]).max() > 0.0
+    np.testing.assert_allclose(there.stacked[0][there.derivative_places], 0.0, atol=1e-12)
+    np.testing.assert_allclose(there.values / scale, _least_squares(start, places.tolist())[:6] / scale, atol=1e-6)
+    assert np.abs((there.values - fitted.values) / scale).max() > 0.1
+
+
+def test_derivatives_that_are_a_cause_stay_free(aircraft, plain_model) -> None:
+    nuisances = nuisances_of(aircraft, plain_model)
+    (cause,) = (c for c in candidates_of(plain_model.simulator, [plain_model]) if c.label == "derivative_error of Cm")
+    fitted = _after_one_step(linearised(with_candidates(unfitted([plain_model], nuisances), [cause], nuisances, ())))
+    there, neutral = beside_file_derivatives(fitted), plain_model.simulator.neutral()
+    moved = there.flights[0].point[list(cause.widened)] - neutral[list(cause.widened)]
+    assert np.abs(moved).max() > 0.0
+    left = set(there.derivative_places) - {there.nuisances.indices.index(i) for i in cause.widened}
+    np.testing.assert_allclose(there.stacked[0][sorted(left)], 0.0, atol=1e-12)
