@@ -20,6 +20,18 @@ from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, st
 _INTERVAL = 1.96
 
 
+def has_insignificant_cause(fit: CandidateFit, errors: Array) -> bool:
+    """Whether the 95 % intervals of all sizes of some cause hold the aircraft file's values.
+
+    Each cause is judged by its most significant size, with the insignificant ones at the file's values. ``errors`` as
+    in ``insignificant_sizes``.
+    """
+    held = [fit.indices.index(i) for i in insignificant_sizes(fit, errors)]
+    ratios = np.abs(_ratios(*_away(fit, errors), held))
+    sizes = [[k for k in map(fit.indices.index, c.indices) if fit.sizing[k]] for c in fit.candidates]
+    return any(max(ratios[own]) <= _INTERVAL for own in sizes if own)
+
+
 def insignificant_sizes(fit: CandidateFit, errors: Array) -> tuple[int, ...]:
     """Entries of the parameter vector of a cause's sizes whose 95 % intervals hold the aircraft file's values.
 
@@ -28,12 +40,8 @@ def insignificant_sizes(fit: CandidateFit, errors: Array) -> tuple[int, ...]:
     others free (backward elimination: Klein & Morelli (2006), Aircraft System Identification, sect. 5.4). Each cause
     keeps its most significant size.
     """
-    simulator, chosen = fit.simulator, list(fit.indices)
-    away = fit.values - simulator.neutral()[chosen]
-    covariance = fit.covariance[: len(chosen), : len(chosen)]
-    larger = errors / np.sqrt(np.diag(covariance))
-    covariance = covariance * np.outer(larger, larger)
-    held: list[int] = []
+    chosen, held = list(fit.indices), list[int]()
+    away, covariance = _away(fit, errors)
     while True:
         ratios = _ratios(away, covariance, held)
         kept = {
@@ -83,6 +91,14 @@ def _moved(fit: CandidateFit, places: NDArray[np.intp], by: Array) -> CandidateF
     normal, right = fit.information[np.ix_(free, free)], fit.information[np.ix_(free, places)] @ step[places]
     step[free] = -np.linalg.solve(normal, right)
     return replace(linearised(stepped(fit, step)), information=fit.information)
+
+
+def _away(fit: CandidateFit, errors: Array) -> tuple[Array, Array]:
+    """How far the sizes (K,) are from the aircraft file's, and their covariance (K, K) with these standard errors."""
+    count = len(fit.indices)
+    covariance = fit.covariance[:count, :count]
+    larger = errors / np.sqrt(np.diag(covariance))
+    return fit.values - fit.simulator.neutral()[list(fit.indices)], covariance * np.outer(larger, larger)
 
 
 def _ratios(away: Array, covariance: Array, held: Sequence[int]) -> Array:

@@ -19,7 +19,12 @@ from sysid_node.gap.estimation.candidates import RESPONSE_DELAYS, SHARED, Candid
 from sysid_node.gap.estimation.checkpoint import Checkpoint
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, Nuisances
 from sysid_node.gap.estimation.predictive_density import probabilities
-from sysid_node.gap.estimation.restriction import beside_file_derivatives, insignificant_sizes, restricted
+from sysid_node.gap.estimation.restriction import (
+    beside_file_derivatives,
+    has_insignificant_cause,
+    insignificant_sizes,
+    restricted,
+)
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.instruments.overidentification import (
     OveridentificationTest,
@@ -95,13 +100,18 @@ class Attribution:
         return replace(self, corrected=linearised(self.base.fit.at(neutral)))
 
     def with_file_derivatives(self) -> Attribution:
-        """The same causes with the file's own derivatives, and the sizes that belong to these."""
+        """The same causes with the file's own derivatives, and the sizes that belong to these.
+
+        The sizes' standard errors are those beside the fitted derivatives, of which it was not known that they are the
+        file's.
+        """
         fit, neutral = beside_file_derivatives(self.corrected, self.held), self.corrected.simulator.neutral()
         entries, points = [*fit.indices, *fit.widened], [neutral.copy() for _ in fit.flights]
         for point, flight in zip(points, fit.flights, strict=True):
             point[entries] = flight.point[entries]
         moved = replace(linearised(fit.at(points)), information=fit.information)
-        return replace(self, corrected=moved, size_source=fit)
+        sizes = self.corrected.at([flight.point for flight in fit.flights])
+        return replace(self, corrected=moved, size_source=sizes)
 
     def by_least_squares(self) -> Attribution:
         """The same causes with the sizes of least squares."""
@@ -117,6 +127,10 @@ class Attribution:
             return None
         moved = replace(self, corrected=restricted(self.size_fit, held), size_source=None, held=held)
         return moved.with_file_derivatives() if self.keeps_file_derivatives else moved
+
+    def has_insignificant_cause(self, errors: Callable[[CandidateFit], Array]) -> bool:
+        """Whether no size of some cause is significant; ``errors`` as in ``without_insignificant_sizes``."""
+        return has_insignificant_cause(self.size_fit, errors(self.size_fit)[: len(self.size_fit.indices)])
 
     def with_fewer_causes(self) -> Iterator[Attribution]:
         """The explanations with one cause less, and of three those with one alone, in the order of ``kept_causes``."""

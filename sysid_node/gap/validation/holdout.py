@@ -235,10 +235,13 @@ def _with_better_derivatives(
     """The causes with the file's own derivatives, where these predict better than with the fitted ones.
 
     What an effect does that the derivatives cannot account for, they are bent to. Beside the effect they may be right.
+    A cause of which nothing significant is left beside them only made up for the fitted ones.
     """
     explanation = attribution.with_file_derivatives()
     try:
         found = validator(explanation)
+        if explanation.has_insignificant_cause(scattered_errors):
+            return attribution, checked
     except np.linalg.LinAlgError:
         return attribution, checked
     clearly = not file_predicts_better(checked.gaps)

@@ -8,7 +8,12 @@ import pytest
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised, unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.nuisances import nuisances_of
-from sysid_node.gap.estimation.restriction import beside_file_derivatives, insignificant_sizes, restricted
+from sysid_node.gap.estimation.restriction import (
+    beside_file_derivatives,
+    has_insignificant_cause,
+    insignificant_sizes,
+    restricted,
+)
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +56,13 @@ def test_the_stated_standard_errors_decide(start) -> None:
     assert insignificant_sizes(fit, stated) == (fit.indices[1],)
 
 
+@pytest.mark.parametrize(("largest", "none"), [(1.9, True), (2.0, False)])
+def test_a_cause_is_insignificant_where_all_of_its_intervals_hold_the_files_values(start, largest, none) -> None:
+    fit = _standing_at(start, [0.1, -largest, 0.4, 0.0, -0.6, 0.5])
+    assert has_insignificant_cause(fit, np.full(6, 0.01)) is none
+    assert has_insignificant_cause(fit, np.full(6, 0.02))
+
+
 def test_of_two_sizes_that_stand_in_for_each_other_one_is_significant(start) -> None:
     """Each alone lies within its interval, because the other may be the reason; both do not."""
     fit = _standing_at(start, [9.0, 1.2, 1.5, 9.0, 9.0, 9.0])
@@ -59,7 +71,9 @@ def test_of_two_sizes_that_stand_in_for_each_other_one_is_significant(start) -> 
     errors = np.sqrt(np.diag(np.linalg.inv(information)))[1:3]
     assert (fit.values[1:3] / errors < 1.96).all()
     unlike = replace(fit, information=information)
-    assert insignificant_sizes(unlike, np.sqrt(np.diag(unlike.covariance))[:6]) == (fit.indices[1],)
+    errors = np.sqrt(np.diag(unlike.covariance))[:6]
+    assert insignificant_sizes(unlike, errors) == (fit.indices[1],)
+    assert not has_insignificant_cause(unlike, errors)
 
 
 def _after_one_step(start: CandidateFit) -> CandidateFit:

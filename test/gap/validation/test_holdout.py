@@ -11,6 +11,7 @@ from gap_flights import fly
 
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.validation.holdout import standing_explanation
+from sysid_node.gap.validation.standard_errors import scattered_errors
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Explanation:
     strained: bool = False  # the derivatives, more than with more causes
     held: float | None = None  # with its insignificant sizes held at the file's values; none where it has none
     named: tuple["Explanation", ...] = ()  # those with fewer causes, where which are left matters
+    beside_file: float = -1.0  # with the file's derivatives; of a matrix that is not positive nothing is predicted
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -42,7 +44,10 @@ class Explanation:
         return self.strained
 
     def with_file_derivatives(self) -> "Explanation":
-        return Explanation(-np.eye(2))  # predicts nothing
+        return Explanation(self.beside_file * np.eye(2))
+
+    def has_insignificant_cause(self, _: object) -> bool:
+        return True  # beside the file's derivatives
 
     def without_insignificant_sizes(self, _: object) -> "Explanation | None":
         return None if self.held is None else Explanation(self.held * np.eye(2))
@@ -120,6 +125,13 @@ def test_sizes_without_which_other_flight_is_predicted_worse_stay(held: float | 
     assert found is explanation and checked.size == pytest.approx(9.0)
 
 
+def test_causes_of_which_nothing_is_left_beside_the_files_derivatives_keep_the_fitted_ones() -> None:
+    """Although flight that was not fitted is predicted better with the file's."""
+    explanation = Explanation(4.0 * np.eye(2), beside_file=16.0)
+    found, checked = standing_explanation(explanation, by_cholesky)
+    assert found is explanation and checked.size == pytest.approx(4.0)
+
+
 @pytest.mark.slow
 def test_sizes_that_no_flight_shows_are_those_of_the_file(aircraft) -> None:
     """The probe reads yaw and roll too; its bias of alpha alone is off in both flights."""
@@ -140,3 +152,10 @@ def test_causes_beside_the_file_leave_the_derivatives_and_have_the_size_that_bel
     point = fit.flights[0].point
     assert beside.keeps_file_derivatives and point[lag] == beside.size_fit.values[0] == pytest.approx(0.08, rel=0.1)
     assert np.flatnonzero(point != fit.simulator.neutral()).tolist() == [lag]
+
+
+def test_beside_the_files_derivatives_standard_errors_are_those_beside_the_fitted_ones(lagging) -> None:
+    """Which are not less for derivatives that are held, nor more for what these then leave."""
+    fitted = lagging.attribution.corrected
+    beside = lagging.attribution.with_file_derivatives().size_fit
+    assert scattered_errors(beside)[0] == pytest.approx(scattered_errors(fitted)[0], rel=0.02)
