@@ -52,9 +52,9 @@ RELATIONS = {
     "pitch": _Relation({"d_theta": 1.0}, {"theta_rate": 1.0}),
     "yaw": _Relation({"d_psi": 1.0}, {"psi_rate": 1.0}),
     # dw/dt = az + g cos(phi) cos(theta) + q u - p v, dv/dt = ay + g sin(phi) cos(theta) - r u + p w
-    "vertical": _Relation({"force_z": 1.0, "pv": -1.0}, {"qu": -1.0}, ("time", "d_q", "d_w")),
+    "vertical": _Relation({"force_z": 1.0, "pv": -1.0}, {"qu": -1.0}, ("time", "d_p", "d_q", "d_w")),
     "lateral": _Relation({"force_y": 1.0}, {"ru": 1.0}, ("time", "d_p", "d_r", "d_v", "pw")),
-    "alpha": _Relation({"force_z": 1.0, "qu": 1.0, "pv": -1.0}, {"d_w": 1.0}, ("time", "d_q")),
+    "alpha": _Relation({"force_z": 1.0, "qu": 1.0, "pv": -1.0}, {"d_w": 1.0}, ("time", "d_p", "d_q")),
     "beta": _Relation({"force_y": 1.0, "ru": -1.0, "pw": 1.0}, {"d_v": 1.0}, ("time", "d_p", "d_r")),
 }
 

@@ -49,12 +49,12 @@ def test_a_factor_of_a_reading_is_the_slopes(factors: dict[str, float], relation
 
 
 def test_biases_and_arms_of_instruments_are_regressed_along() -> None:
-    """An IMU 0.5 m ahead of the CG and 0.2 m/s^2 off; a vane 0.4 m ahead."""
+    """An IMU 0.5 m ahead of the CG, 0.3 m to the right, and 0.2 m/s^2 off; a vane 0.4 m ahead, 0.7 m out on the wing."""
     time, c = readings()
-    q_rate, r_rate = np.gradient(c["q"], time), np.gradient(c["r"], time)
-    c["az"] = c["az"] + 0.2 - 0.5 * q_rate
+    p_rate, q_rate, r_rate = (np.gradient(c[rate], time) for rate in "pqr")
+    c["az"] = c["az"] + 0.2 - 0.5 * q_rate + 0.3 * p_rate
     c["ay"] = c["ay"] - 0.2 + 0.5 * r_rate
-    c["alpha"] = c["alpha"] - 0.4 * c["q"] / c["V"]
+    c["alpha"] = c["alpha"] + (0.7 * c["p"] - 0.4 * c["q"]) / c["V"]
     table = np.column_stack([c[name] for name in NAMES])
     found = KinematicRelations()
     found.add(time, table[:, :6], table[:, 6:9], table[:, 9:])
