@@ -99,6 +99,13 @@ class Check:
         base = replace(self.base, flights=tuple(filed))
         return replace(self, base=base, final=base, gap=self._gap_of(base, base))
 
+    def beside_file(self, fitted: Check) -> Check:
+        """The validation of causes with the file's derivatives; ``fitted`` is that with the fitted ones."""
+        filed = self.as_in_file()
+        gap = spectral_error.gap_of(filed.base, self.final, self.explanation.structure_left)
+        base = replace(filed.base, scores=self.base.scores)
+        return replace(self, base=base, gap=gap, fitted=fitted)
+
     def _gap_of(self, base: Evidence, after: Evidence) -> Gap:
         """The gap by frequency of other evidence of the same flights."""
         return spectral_error.gap_of(base, after, self.explanation.structure_left)
@@ -154,15 +161,24 @@ def standing_explanation(attribution: Attribution, validator: Validator) -> tupl
     cause. Each is also tried with the file's own derivatives, and kept so where these predict better. An explanation
     whose predictions are not finite is passed over. What stands is left without the causes that are needless there,
     and its insignificant sizes are held at the file's values where that predicts no worse.
+
+    A cause of which nothing significant is left beside the file's derivatives only made up for the fitted ones. Such an
+    explanation is kept with the fitted derivatives, unless one with fewer causes predicts better.
     """
+    spare: tuple[Attribution, Check] | None = None
     for explanation in _explanations(attribution):
         try:
-            found = explanation, validator(explanation)
+            fitted = explanation, validator(explanation)
+            found = _with_better_derivatives(*fitted, validator)
+            hollow = _is_hollow(found[0])
         except np.linalg.LinAlgError:
             continue
-        found = _with_better_derivatives(*found, validator)
-        if _stands(*found):
+        if hollow:
+            spare = spare or (fitted if _stands(*fitted) else None)
+        elif _stands(*found) and (spare is None or found[1].gaps[-1].after < spare[1].gaps[-1].after):
             return _without_insignificant_sizes(*_without_needless_causes(*found, validator), validator)
+    if spare is not None:
+        return _without_insignificant_sizes(*_without_needless_causes(*spare, validator), validator)
     bare = attribution.without_causes()
     return bare, validator(bare)
 
@@ -190,7 +206,7 @@ def _without_needless_causes(
             if is_needless(checked.gaps, found.gaps):
                 whole = _with_better_derivatives(smaller, validator(smaller) if filed else found, validator)
                 as_before = whole[0].keeps_file_derivatives or not filed
-                fewer.extend([whole] if as_before and _stands(*whole) else [])
+                fewer.extend([whole] if as_before and _stands(*whole) and not _is_hollow(whole[0]) else [])
         except np.linalg.LinAlgError:
             continue
     fewest = [each for each in fewer if all(is_needless(more.gaps, each[1].gaps) for more in _larger(each[0], fewer))]
@@ -235,19 +251,18 @@ def _with_better_derivatives(
     """The causes with the file's own derivatives, where these predict better than with the fitted ones.
 
     What an effect does that the derivatives cannot account for, they are bent to. Beside the effect they may be right.
-    A cause of which nothing significant is left beside them only made up for the fitted ones.
     """
     explanation = attribution.with_file_derivatives()
     try:
         found = validator(explanation)
-        if explanation.has_insignificant_cause(scattered_errors):
-            return attribution, checked
     except np.linalg.LinAlgError:
         return attribution, checked
     clearly = not file_predicts_better(checked.gaps)
     if not file_derivatives_suit_causes(found.gaps, checked.gaps, clearly=clearly):
         return attribution, checked
-    filed = found.as_in_file()
-    gap = spectral_error.gap_of(filed.base, found.final, attribution.structure_left)
-    base = replace(filed.base, scores=found.base.scores)
-    return explanation, replace(found, base=base, gap=gap, fitted=checked)
+    return explanation, found.beside_file(checked)
+
+
+def _is_hollow(attribution: Attribution) -> bool:
+    """Whether of some cause nothing significant is left beside the file's derivatives."""
+    return attribution.keeps_file_derivatives and attribution.has_insignificant_cause(scattered_errors)

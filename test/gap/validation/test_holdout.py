@@ -1,7 +1,7 @@
 """Validation on flight not fitted. Truth: an explanation whose predictions are not finite explains nothing."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -28,6 +28,7 @@ class Explanation:
     held: float | None = None  # with its insignificant sizes held at the file's values; none where it has none
     named: tuple["Explanation", ...] = ()  # those with fewer causes, where which are left matters
     beside_file: float = -1.0  # with the file's derivatives; of a matrix that is not positive nothing is predicted
+    hollow: bool = False  # of a cause nothing significant is left there
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -44,10 +45,10 @@ class Explanation:
         return self.strained
 
     def with_file_derivatives(self) -> "Explanation":
-        return Explanation(self.beside_file * np.eye(2))
+        return replace(self, corrected=self.beside_file * np.eye(2), keeps_file_derivatives=True)
 
     def has_insignificant_cause(self, _: object) -> bool:
-        return True  # beside the file's derivatives
+        return self.hollow
 
     def without_insignificant_sizes(self, _: object) -> "Explanation | None":
         return None if self.held is None else Explanation(self.held * np.eye(2))
@@ -60,7 +61,9 @@ def by_cholesky(explanation: Explanation, *_: object) -> SimpleNamespace:
     """The larger, the better it predicts; 3 is as good as the file, for which 1.5 are the derivatives alone."""
     size = float(np.linalg.cholesky(explanation.corrected)[0, 0] ** 2)
     gaps = [SimpleNamespace(before=3.0, tolerances=1.5, after=3.0 / size, per_channel={})]
-    return SimpleNamespace(gaps=gaps, attitude={}, size=size)
+    found = SimpleNamespace(gaps=gaps, attitude={}, size=size)
+    found.beside_file = lambda fitted: found
+    return found
 
 
 @pytest.mark.parametrize(
@@ -125,11 +128,20 @@ def test_sizes_without_which_other_flight_is_predicted_worse_stay(held: float | 
     assert found is explanation and checked.size == pytest.approx(9.0)
 
 
-def test_causes_of_which_nothing_is_left_beside_the_files_derivatives_keep_the_fitted_ones() -> None:
-    """Although flight that was not fitted is predicted better with the file's."""
-    explanation = Explanation(4.0 * np.eye(2), beside_file=16.0)
-    found, checked = standing_explanation(explanation, by_cholesky)
-    assert found is explanation and checked.size == pytest.approx(4.0)
+def test_the_files_derivatives_are_kept_where_causes_predict_better_beside_them() -> None:
+    found, checked = standing_explanation(Explanation(4.0 * np.eye(2), beside_file=16.0), by_cholesky)
+    assert found.keeps_file_derivatives and checked.size == pytest.approx(16.0)
+
+
+@pytest.mark.parametrize(("fewer", "stands"), [((), 4.0), ((3.9,), 4.0), ((4.1,), 4.1)])
+def test_a_cause_of_which_nothing_is_left_beside_the_files_derivatives_is_no_reason_to_keep_these(
+    fewer: tuple[float, ...], stands: float
+) -> None:
+    """Without it, or else with the fitted derivatives, whichever predicts flight that was not fitted better."""
+    explanation = Explanation(4.0 * np.eye(2), SimpleNamespace(fit=-np.eye(2)), beside_file=16.0, hollow=True)
+    found, checked = standing_explanation(replace(explanation, smaller=fewer), by_cholesky)
+    assert checked.size == pytest.approx(stands)
+    assert not found.keeps_file_derivatives
 
 
 @pytest.mark.slow
