@@ -49,7 +49,7 @@ def test_a_factor_of_a_reading_is_the_slopes(factors: dict[str, float], relation
 
 
 def test_biases_and_arms_of_instruments_are_regressed_along() -> None:
-    """An IMU 0.5 m ahead of the CG, 0.3 m to the right, and 0.2 m/s^2 off; a vane 0.4 m ahead, 0.7 m out on the wing."""
+    """An IMU 0.5 m ahead of the CG, 0.3 m to the right, and 0.2 m/s^2 off; a vane 0.4 m ahead, 0.7 m to the right."""
     time, c = readings()
     p_rate, q_rate, r_rate = (np.gradient(c[rate], time) for rate in "pqr")
     c["az"] = c["az"] + 0.2 - 0.5 * q_rate + 0.3 * p_rate

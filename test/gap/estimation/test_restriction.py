@@ -1,4 +1,4 @@
-"""Sizes and derivatives held at the file's values. Truth: least squares without the columns of what is held, and drawn noise."""
+"""Unknowns held at the file's values. Truth: least squares without the columns of what is held, and drawn noise."""
 
 from dataclasses import replace
 

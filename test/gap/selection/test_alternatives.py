@@ -68,7 +68,9 @@ def test_wrong_derivatives_are_compared_with_every_effect_that_was_fitted_alone(
     first = [fitter.add_candidate(base, candidates[name]) for name in names]
     delay = fitter.add_candidate(base, candidates["command_delay"])
     both = fitter.add_candidate(delay, candidates["derivative_error of Cm"])
-    _, positions = replace_stepwise(fitter, base, both, [stage_of(*first, delay), stage_of(both)], [], frozenset(candidates))
+    _, positions = replace_stepwise(
+        fitter, base, both, [stage_of(*first, delay), stage_of(both)], [], frozenset(candidates)
+    )
     tried = {each.candidate.effect: {a.added.label for a in each.alternatives} for each in positions}
     assert tried["derivative_error"] >= set(names)
     assert not tried["command_delay"] >= set(names)

@@ -66,7 +66,9 @@ def test_what_is_there_besides_is_no_imitation(mistaken) -> None:
     fitter, base, candidates = mistaken
     shift = fitter.add_candidate(base, candidates["cg_shift"])
     stage = [shift, fitter.add_candidate(base, candidates["command_delay"])]
-    _, causes, rejected = select_causes(fitter, base, shift, [stage_of(*stage)], [], [rejected_for_its_equation(mistaken)])
+    _, causes, rejected = select_causes(
+        fitter, base, shift, [stage_of(*stage)], [], [rejected_for_its_equation(mistaken)]
+    )
     (cause,) = (each for each in (*causes, *rejected) if each.candidate.effect == "cg_shift")
     assert cause.imitation < 1e-6
 
