@@ -63,6 +63,7 @@ class Attribution:
     first_stage: tuple[FittedSet, ...] = ()  # these candidates, fitted
     held_out: tuple[HeldOutFlight, ...] = ()
     size_source: CandidateFit | None = None  # of the sizes, where the corrected fit has the file's derivatives
+    sizes_of_file: bool = False  # whether these belong to the file's derivatives, not to the fitted ones
     held: tuple[int, ...] = ()  # entries of causes' sizes that were held at the aircraft file's values
 
     @property
@@ -99,19 +100,21 @@ class Attribution:
         neutral = [model.simulator.neutral() for model in self.base.fit.models]
         return replace(self, corrected=linearised(self.base.fit.at(neutral)))
 
-    def with_file_derivatives(self) -> Attribution:
-        """The same causes with the file's own derivatives, and the sizes that belong to these.
+    def with_file_derivatives(self, *, sizes: bool) -> Attribution:
+        """The same causes with the file's own derivatives; and the ``sizes`` that belong to these, or the fit's.
 
         The sizes' standard errors are those beside the fitted derivatives, of which it was not known that they are the
         file's.
         """
-        fit, neutral = beside_file_derivatives(self.corrected, self.held), self.corrected.simulator.neutral()
+        fit, neutral = self.corrected, self.corrected.simulator.neutral()
+        if sizes:
+            fit = beside_file_derivatives(fit, self.held)
         entries, points = [*fit.indices, *fit.widened], [neutral.copy() for _ in fit.flights]
         for point, flight in zip(points, fit.flights, strict=True):
             point[entries] = flight.point[entries]
         moved = replace(linearised(fit.at(points)), information=fit.information)
-        sizes = self.corrected.at([flight.point for flight in fit.flights])
-        return replace(self, corrected=moved, size_source=sizes)
+        source = self.corrected.at([flight.point for flight in fit.flights])
+        return replace(self, corrected=moved, size_source=source, sizes_of_file=sizes)
 
     def by_least_squares(self) -> Attribution:
         """The same causes with the sizes of least squares."""
@@ -126,7 +129,7 @@ class Attribution:
         if not held:
             return None
         moved = replace(self, corrected=restricted(self.size_fit, held), size_source=None, held=held)
-        return moved.with_file_derivatives() if self.keeps_file_derivatives else moved
+        return moved.with_file_derivatives(sizes=self.sizes_of_file) if self.keeps_file_derivatives else moved
 
     def has_insignificant_cause(self, errors: Callable[[CandidateFit], Array]) -> bool:
         """Whether no size of some cause is significant; ``errors`` as in ``without_insignificant_sizes``."""

@@ -202,7 +202,8 @@ def _without_needless_causes(
         if not filed and smaller.has_less_plausible_derivatives_than(attribution):
             continue
         try:
-            found = validator(smaller.with_file_derivatives() if filed else smaller)
+            sizes = attribution.sizes_of_file
+            found = validator(smaller.with_file_derivatives(sizes=sizes) if filed else smaller)
             if is_needless(checked.gaps, found.gaps):
                 whole = _with_better_derivatives(smaller, validator(smaller) if filed else found, validator)
                 as_before = whole[0].keeps_file_derivatives or not filed
@@ -250,17 +251,20 @@ def _with_better_derivatives(
 ) -> tuple[Attribution, Check]:
     """The causes with the file's own derivatives, where these predict better than with the fitted ones.
 
-    What an effect does that the derivatives cannot account for, they are bent to. Beside the effect they may be right.
+    What an effect does that the derivatives cannot account for, they are bent to. Beside the effect they may be right;
+    then its size is the one that belongs to them. Where they are wrong, too, that of the fit may be the better one.
     """
-    explanation = attribution.with_file_derivatives()
-    try:
-        found = validator(explanation)
-    except np.linalg.LinAlgError:
-        return attribution, checked
-    clearly = not file_predicts_better(checked.gaps)
-    if not file_derivatives_suit_causes(found.gaps, checked.gaps, clearly=clearly):
-        return attribution, checked
-    return explanation, found.beside_file(checked)
+    clearly, best = not file_predicts_better(checked.gaps), (attribution, checked)
+    for sizes in (True, False):
+        explanation = attribution.with_file_derivatives(sizes=sizes)
+        try:
+            found = validator(explanation)
+        except np.linalg.LinAlgError:
+            continue
+        least = clearly and best[1] is checked
+        if file_derivatives_suit_causes(found.gaps, best[1].gaps, clearly=least):
+            best = explanation, found
+    return best if best[1] is checked else (best[0], best[1].beside_file(checked))
 
 
 def _is_hollow(attribution: Attribution) -> bool:

@@ -29,6 +29,7 @@ class Explanation:
     named: tuple["Explanation", ...] = ()  # those with fewer causes, where which are left matters
     beside_file: float = -1.0  # with the file's derivatives; of a matrix that is not positive nothing is predicted
     hollow: bool = False  # of a cause nothing significant is left there
+    sizes_of_file: bool = True  # there the sizes predict better that belong to them
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -44,8 +45,9 @@ class Explanation:
     def has_less_plausible_derivatives_than(self, larger: "Explanation") -> bool:
         return self.strained
 
-    def with_file_derivatives(self) -> "Explanation":
-        return replace(self, corrected=self.beside_file * np.eye(2), keeps_file_derivatives=True)
+    def with_file_derivatives(self, *, sizes: bool) -> "Explanation":
+        better = self.beside_file if sizes is self.sizes_of_file else min(self.beside_file, 1.0)
+        return replace(self, corrected=better * np.eye(2), keeps_file_derivatives=True, sizes_of_file=sizes)
 
     def has_insignificant_cause(self, _: object) -> bool:
         return self.hollow
@@ -128,9 +130,12 @@ def test_sizes_without_which_other_flight_is_predicted_worse_stay(held: float | 
     assert found is explanation and checked.size == pytest.approx(9.0)
 
 
-def test_the_files_derivatives_are_kept_where_causes_predict_better_beside_them() -> None:
-    found, checked = standing_explanation(Explanation(4.0 * np.eye(2), beside_file=16.0), by_cholesky)
-    assert found.keeps_file_derivatives and checked.size == pytest.approx(16.0)
+@pytest.mark.parametrize("sizes", [True, False])
+def test_the_files_derivatives_are_kept_where_causes_predict_better_beside_them(sizes: bool) -> None:
+    """With the sizes that belong to them or those of the fit, whichever predict better."""
+    explanation = Explanation(4.0 * np.eye(2), beside_file=16.0, sizes_of_file=sizes)
+    found, checked = standing_explanation(explanation, by_cholesky)
+    assert found.keeps_file_derivatives and found.sizes_of_file is sizes and checked.size == pytest.approx(16.0)
 
 
 @pytest.mark.parametrize(("fewer", "stands"), [((), 4.0), ((3.9,), 4.0), ((4.1,), 4.1)])
@@ -158,7 +163,7 @@ def test_sizes_that_no_flight_shows_are_those_of_the_file(aircraft) -> None:
 
 
 def test_causes_beside_the_file_leave_the_derivatives_and_have_the_size_that_belongs_to_these(lagging) -> None:
-    beside = lagging.attribution.with_file_derivatives()
+    beside = lagging.attribution.with_file_derivatives(sizes=True)
     fit = beside.corrected
     (lag,) = fit.indices
     point = fit.flights[0].point
@@ -169,5 +174,5 @@ def test_causes_beside_the_file_leave_the_derivatives_and_have_the_size_that_bel
 def test_beside_the_files_derivatives_standard_errors_are_those_beside_the_fitted_ones(lagging) -> None:
     """Which are not less for derivatives that are held, nor more for what these then leave."""
     fitted = lagging.attribution.corrected
-    beside = lagging.attribution.with_file_derivatives().size_fit
+    beside = lagging.attribution.with_file_derivatives(sizes=True).size_fit
     assert scattered_errors(beside)[0] == pytest.approx(scattered_errors(fitted)[0], rel=0.02)
