@@ -252,17 +252,17 @@ def _with_better_derivatives(
     """The causes with the file's own derivatives, where these predict better than with the fitted ones.
 
     What an effect does that the derivatives cannot account for, they are bent to. Beside the effect they may be right;
-    then its size is the one that belongs to them. Where they are wrong, too, that of the fit may be the better one.
+    then its size is the one that belongs to them, which is taken where it predicts clearly better than that of the fit.
     """
-    clearly, best = not file_predicts_better(checked.gaps), (attribution, checked)
-    for sizes in (True, False):
+    best = attribution, checked
+    for sizes in (False, True):
         explanation = attribution.with_file_derivatives(sizes=sizes)
         try:
             found = validator(explanation)
         except np.linalg.LinAlgError:
             continue
-        least = clearly and best[1] is checked
-        if file_derivatives_suit_causes(found.gaps, best[1].gaps, clearly=least):
+        clearly = sizes or not file_predicts_better(checked.gaps)
+        if file_derivatives_suit_causes(found.gaps, best[1].gaps, clearly=clearly):
             best = explanation, found
     return best if best[1] is checked else (best[0], best[1].beside_file(checked))
 
