@@ -165,20 +165,20 @@ def standing_explanation(attribution: Attribution, validator: Validator) -> tupl
     A cause of which nothing significant is left beside the file's derivatives only made up for the fitted ones. Such an
     explanation is kept with the fitted derivatives, unless one with fewer causes predicts better.
     """
-    spare: tuple[Attribution, Check] | None = None
+    fallback: tuple[Attribution, Check] | None = None
     for explanation in _explanations(attribution):
         try:
             fitted = explanation, validator(explanation)
             found = _with_better_derivatives(*fitted, validator)
-            hollow = _is_hollow(found[0])
+            insignificant = _has_insignificant_cause(found[0])
         except np.linalg.LinAlgError:
             continue
-        if hollow:
-            spare = spare or (fitted if _stands(*fitted) else None)
-        elif _stands(*found) and (spare is None or found[1].gaps[-1].after < spare[1].gaps[-1].after):
+        if insignificant:
+            fallback = fallback or (fitted if _stands(*fitted) else None)
+        elif _stands(*found) and (fallback is None or found[1].gaps[-1].after < fallback[1].gaps[-1].after):
             return _without_insignificant_sizes(*_without_needless_causes(*found, validator), validator)
-    if spare is not None:
-        return _without_insignificant_sizes(*_without_needless_causes(*spare, validator), validator)
+    if fallback is not None:
+        return _without_insignificant_sizes(*_without_needless_causes(*fallback, validator), validator)
     bare = attribution.without_causes()
     return bare, validator(bare)
 
@@ -196,18 +196,19 @@ def _without_needless_causes(
     At least as well as each larger one that does, too. Only where no derivative moves in a cause's place: where all are
     the file's, or are no farther from it without it.
     """
-    filed = attribution.keeps_file_derivatives
+    filed, sizes = attribution.keeps_file_derivatives, attribution.sizes_of_file
     fewer = []
     for smaller in attribution.with_fewer_causes() if len(attribution.causes) > 1 else ():
         if not filed and smaller.has_less_plausible_derivatives_than(attribution):
             continue
         try:
-            sizes = attribution.sizes_of_file
             found = validator(smaller.with_file_derivatives(sizes=sizes) if filed else smaller)
             if is_needless(checked.gaps, found.gaps):
                 whole = _with_better_derivatives(smaller, validator(smaller) if filed else found, validator)
                 as_before = whole[0].keeps_file_derivatives or not filed
-                fewer.extend([whole] if as_before and _stands(*whole) and not _is_hollow(whole[0]) else [])
+                fewer.extend(
+                    [whole] if as_before and _stands(*whole) and not _has_insignificant_cause(whole[0]) else []
+                )
         except np.linalg.LinAlgError:
             continue
     fewest = [each for each in fewer if all(is_needless(more.gaps, each[1].gaps) for more in _larger(each[0], fewer))]
@@ -267,6 +268,6 @@ def _with_better_derivatives(
     return best if best[1] is checked else (best[0], best[1].beside_file(checked))
 
 
-def _is_hollow(attribution: Attribution) -> bool:
+def _has_insignificant_cause(attribution: Attribution) -> bool:
     """Whether of some cause nothing significant is left beside the file's derivatives."""
     return attribution.keeps_file_derivatives and attribution.has_insignificant_cause(scattered_errors)

@@ -28,7 +28,7 @@ class Explanation:
     held: float | None = None  # with its insignificant sizes held at the file's values; none where it has none
     named: tuple["Explanation", ...] = ()  # those with fewer causes, where which are left matters
     beside_file: float = -1.0  # with the file's derivatives; of a matrix that is not positive nothing is predicted
-    hollow: bool = False  # of a cause nothing significant is left there
+    insignificant: bool = False  # of a cause nothing significant is left there
     sizes_of_file: bool = True  # there the sizes predict better that belong to them
 
     @property
@@ -50,7 +50,7 @@ class Explanation:
         return replace(self, corrected=better * np.eye(2), keeps_file_derivatives=True, sizes_of_file=sizes)
 
     def has_insignificant_cause(self, _: object) -> bool:
-        return self.hollow
+        return self.insignificant
 
     def without_insignificant_sizes(self, _: object) -> "Explanation | None":
         return None if self.held is None else Explanation(self.held * np.eye(2))
@@ -143,7 +143,7 @@ def test_a_cause_of_which_nothing_is_left_beside_the_files_derivatives_is_no_rea
     fewer: tuple[float, ...], stands: float
 ) -> None:
     """Without it, or else with the fitted derivatives, whichever predicts flight that was not fitted better."""
-    explanation = Explanation(4.0 * np.eye(2), SimpleNamespace(fit=-np.eye(2)), beside_file=16.0, hollow=True)
+    explanation = Explanation(4.0 * np.eye(2), SimpleNamespace(fit=-np.eye(2)), beside_file=16.0, insignificant=True)
     found, checked = standing_explanation(replace(explanation, smaller=fewer), by_cholesky)
     assert checked.size == pytest.approx(stands)
     assert not found.keeps_file_derivatives
