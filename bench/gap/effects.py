@@ -30,7 +30,7 @@ from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
 from sysid_node.gap.estimation.candidates import UNOBSERVABLE
 from sysid_node.gap.flightdata.flow_angles import ANGLES
-from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
+from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flights
 from sysid_node.sim import EFFECTS, Simulator
 from sysid_node.sim.flying.recording import FlightSampler
 from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie
@@ -67,7 +67,8 @@ def fly(
     record = flight_record(belief, FlightSampler(RATE, RATE, RATE).record(sortie), 0.2)
     unread = {} if vanes else {name: np.full(len(record), np.nan) for name in ANGLES}
     record = replace(record, columns={**record.columns, **unread})
-    return completed_flight(belief, GapFlight(record, RATE, RATE, RATE, source=f"flight {seed}"))
+    [whole] = completed_flights(belief, GapFlight(record, RATE, RATE, RATE, source=f"flight {seed}"))
+    return whole
 
 
 def told(effect: str, vanes: bool) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from bench.spikes.judging import Judged, judge
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
-from sysid_node.gap.flightdata.gap_flight import flight_of_streams
+from sysid_node.gap.flightdata.gap_flight import flights_of_streams
 
 #: Effect -> its size; in the last row there is none.
 EFFECTS: Mapping[str, Mapping[str, float]] = {
@@ -94,10 +94,10 @@ def _diagnosed(out: Path, commands: str, log: str, effect: str) -> Mapping[str, 
         path.parent.mkdir(parents=True, exist_ok=True)
         aircraft = load_aircraft(_AIRCRAFT)
         fitted, held_out = (
-            flight_of_streams(logged(bag, LOGS[log], vanes=False), aircraft, bag.name)
+            flights_of_streams(logged(bag, LOGS[log], vanes=False), aircraft, bag.name)
             for bag in _bags(out, commands, effect)
         )
-        said = document(diagnose(aircraft, [fitted], [held_out]))
+        said = document(diagnose(aircraft, fitted, held_out))
         path.write_text(json.dumps(said, default=float), encoding="utf-8")
         print(commands, effect, log, said["verdict"], [(c["label"], c["probability"]) for c in said["causes"]])
     found: Mapping[str, Any] = json.loads(path.read_text(encoding="utf-8"))

@@ -25,7 +25,7 @@ from sysid_node.gap.estimation.candidates import candidates_of
 from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import HeldOutFlight, nuisances_of
 from sysid_node.gap.estimation.predictive_density import Evidence, FlightEvidence, held_out_evidence
-from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight, completed_flight
+from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, GapFlight, completed_flights
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
@@ -82,7 +82,8 @@ def fly(aircraft: Aircraft, effects: Effects, seed: int, turbulence: str) -> Gap
     deflections[:, :-1] = plan.surfaces()
     sortie = fly_sortie(simulator, deflections, SortieConditions(effects, turbulence=turbulence, seed=seed))
     record = flight_record(aircraft, FlightSampler(_IMU_RATE, 100.0, 100.0).record(sortie), 0.2)
-    return completed_flight(aircraft, GapFlight(record, _IMU_RATE, 100.0, 100.0, source=f"flight {seed}"))
+    [whole] = completed_flights(aircraft, GapFlight(record, _IMU_RATE, 100.0, 100.0, source=f"flight {seed}"))
+    return whole
 
 
 def fitted(model: ResidualModel, effect: str) -> tuple[CandidateFit, CandidateFit]:

@@ -30,7 +30,7 @@ from sysid_node.aircraft.model import Aircraft
 from sysid_node.flight.align import flight_record
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
-from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
+from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flights
 
 Effects = Mapping[str, Mapping[str, float]]
 
@@ -109,7 +109,8 @@ def _flown(
     streams = record(log, readings(log, plant.truth, effects), plant.truth, effects, suite, noise, random)
     flown = flight_record(file, streams, 0.2)
     source = f"{plant.case.plant} {flight}"
-    return completed_flight(file, GapFlight(flown, suite.imu, suite.air, suite.actuators, source=source))
+    [whole] = completed_flights(file, GapFlight(flown, suite.imu, suite.air, suite.actuators, source=source))
+    return whole
 
 
 def right(case: Case, found: Mapping[str, Any]) -> bool:

@@ -29,7 +29,7 @@ from sysid_node.errors import InputError
 from sysid_node.flight.record import FlightRecord
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
-from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
+from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flights
 
 
 def main() -> None:
@@ -102,7 +102,8 @@ def diagnosed(folder: Path, case: Case, flight: Flight | None = None) -> dict[st
 def gap_flight(aircraft: Aircraft, record: FlightRecord, source: str) -> GapFlight:
     """A record as a diagnosis takes it. Raises InputError."""
     rate = rate_of(record)
-    return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=source))
+    [whole] = completed_flights(aircraft, GapFlight(record, rate, rate, rate, source=source))
+    return whole
 
 
 if __name__ == "__main__":

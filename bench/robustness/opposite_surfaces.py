@@ -26,7 +26,7 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError, InputWarning
 from sysid_node.flight.record import FlightRecord
-from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight, load_gap_flight
+from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flights, load_gap_flights
 from sysid_node.gap.flightdata.opposite_readings import check_directions
 
 _SURFACES = ("de", "da", "dr")
@@ -75,7 +75,7 @@ def _real() -> Iterator[_Known]:
 
 def _known(bag: Path, name: str) -> _Known:
     aircraft = load_aircraft(name)
-    return aircraft, load_gap_flight(bag, aircraft, None, "flu")
+    return aircraft, load_gap_flights(bag, aircraft, None, "flu")[0]
 
 
 def _count(flights: list[_Known], factors: Mapping[str, float] | None, late: float = 0.0) -> str:
@@ -93,7 +93,7 @@ def _refused(aircraft: Aircraft, flight: GapFlight, factors: Mapping[str, float]
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always", InputWarning)
         try:
-            check_directions(aircraft, completed_flight(aircraft, changed))
+            check_directions(aircraft, completed_flights(aircraft, changed)[0])
         except InputError as error:
             return "counted the other way" in str(error)
     said = [str(each.message) for each in warned]

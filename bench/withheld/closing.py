@@ -23,7 +23,7 @@ from bench.withheld.plants.plant import RATE, Plant
 from bench.withheld.predicting import everywhere, vector
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
-from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, load_gap_flight
+from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, load_gap_flights
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.validation.simulation_error import simulation_gap
 from sysid_node.sim import Simulator
@@ -91,7 +91,8 @@ def _beside_record(label: Mapping[str, Any], case: Path) -> dict[str, float]:
     """The simulator's errors on the held-out record, by the diagnosis' own rule, noise and all."""
     aircraft, corrected = (load_aircraft(str(case / name)) for name in ("aircraft.yaml", "out/corrected.yaml"))
     simulator = Simulator(aircraft, ANALYSIS_RATE)
-    model = residual_model_of(simulator, load_gap_flight(case / "held", aircraft, None, "flu"))
+    [held] = load_gap_flights(case / "held", aircraft, None, "flu")
+    model = residual_model_of(simulator, held)
     found = effects_of((case / "out" / "effects.txt").read_text(encoding="utf-8"))
     points = (vector(simulator, corrected, effects) for effects in (found, label["effects"]))
     gap = simulation_gap(*(everywhere((model,), point) for point in points))

@@ -23,7 +23,7 @@ from bench.withheld.plants.plant import Plant
 from bench.withheld.predicting import everywhere, vector
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.flight.bag.writer import write_streams
-from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, load_gap_flight
+from sysid_node.gap.flightdata.gap_flight import ANALYSIS_RATE, load_gap_flights
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.validation.simulation_error import simulation_gap
@@ -60,7 +60,8 @@ def _model(
     streams = record(log, seen, plant.truth, effects, SUITES[case.suite], case.noise, random)
     with tempfile.TemporaryDirectory() as folder:
         write_streams(Path(folder) / "flight", streams)
-        return residual_model_of(simulator, load_gap_flight(Path(folder) / "flight", simulator.aircraft, None, "flu"))
+        [seen] = load_gap_flights(Path(folder) / "flight", simulator.aircraft, None, "flu")
+    return residual_model_of(simulator, seen)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from sysid_node.gap.correction import corrected_aircraft
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.diagnose import diagnose as diagnose_flights
 from sysid_node.gap.document import document
-from sysid_node.gap.flightdata.gap_flight import GapFlight, load_gap_flight
+from sysid_node.gap.flightdata.gap_flight import GapFlight, load_gap_flights, longest
 from sysid_node.gap.flightdata.opposite_readings import check_directions
 from sysid_node.gap.reflying import InSimulator, fly_in, reflown_content
 from sysid_node.report.drawing.plotly_figure import plotly_figure
@@ -152,24 +153,29 @@ def diagnose(
                 group,
                 actuators,
                 lambda f, carried: _checked(
-                    aircraft, load_gap_flight(f.path, aircraft, f.topics, f.body_frame, carried)
+                    aircraft, load_gap_flights(f.path, aircraft, f.topics, f.body_frame, carried)
                 ),
-                lambda flight: flight.record.commanded,
+                lambda parts: parts[0].record.commanded,
             )
             for group in ([*flights, *held], of_simulation)
         )
-    fitted, held_out = real[: len(flights)], real[len(flights) :]
+    fitted, held_out = _all_parts(real[: len(flights)]), _all_parts(real[len(flights) :])
     keep = None if resume is None else Path(resume)
     release_compiled_programs()
     report = progress or (lambda share, doing: None)
-    found = diagnose_flights(aircraft, fitted, held_out, report, keep=keep, simulated=of_simulator)
+    found = diagnose_flights(aircraft, fitted, held_out, report, keep=keep, simulated=_all_parts(of_simulator))
     if theirs is None:
         return GapDiagnosis(found, warnings=tuple(noted))
     report(0.99, f"the held-out commands in {theirs.label}")
     return GapDiagnosis(found, fly_in(theirs, found), tuple(noted))
 
 
-def _checked(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
-    """The flight, once it is known which way its surfaces are counted."""
-    check_directions(aircraft, flight)
-    return flight
+def _all_parts(flights: Sequence[list[GapFlight]]) -> list[GapFlight]:
+    """The parts of all flights."""
+    return list(chain.from_iterable(flights))
+
+
+def _checked(aircraft: Aircraft, parts: list[GapFlight]) -> list[GapFlight]:
+    """The parts of a flight, once it is known which way its surfaces are counted."""
+    check_directions(aircraft, longest(parts))
+    return parts

@@ -1,13 +1,14 @@
 """Flights of known effects for the tests: recorded as a bag would be, and aligned again."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.flight.align import flight_record
-from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
+from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flights
 from sysid_node.gap.selection.fitted_set import FittedSet, Stage
 from sysid_node.sim import Simulator
 from sysid_node.sim.flying.recording import FlightSampler
@@ -37,7 +38,21 @@ def fly(
         deflections[:, :3] = plan.surfaces()
     sortie = fly_sortie(simulator, deflections, SortieConditions(effects, turbulence=turbulence, seed=seed))
     record = flight_record(aircraft, FlightSampler(100.0, 100.0, 100.0).record(sortie), 0.2)
-    return completed_flight(aircraft, GapFlight(record, 100.0, 100.0, 100.0, source=f"flight {seed}"))
+    return whole(aircraft, GapFlight(record, 100.0, 100.0, 100.0, source=f"flight {seed}"))
+
+
+def interrupted(aircraft: Aircraft, flight: GapFlight, first: float, last: float) -> list[GapFlight]:
+    """The parts of a flight whose recording lacks what came between two times, s."""
+    record = flight.record
+    kept = (record.time < first) | (record.time > last)
+    columns = {name: values[kept] for name, values in record.columns.items()}
+    return completed_flights(aircraft, replace(flight, record=replace(record, time=record.time[kept], columns=columns)))
+
+
+def whole(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
+    """A flight without an interruption, completed."""
+    [one] = completed_flights(aircraft, flight)
+    return one
 
 
 def stage_of(*fitted: FittedSet) -> Stage:

@@ -3,12 +3,12 @@
 from dataclasses import replace
 
 import pytest
-from gap_flights import fly
+from gap_flights import fly, interrupted
 
 from sysid_node.aircraft.dump import dump_aircraft
 from sysid_node.aircraft.load import parse_aircraft
 from sysid_node.aircraft.model import UncertainValue
-from sysid_node.errors import InputError
+from sysid_node.errors import InputError, InputWarning
 from sysid_node.gap.correction import corrected_aircraft
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
@@ -61,6 +61,19 @@ def test_servos_slower_than_the_file_says_are_named_and_the_corrected_file_leave
     assert "the aircraft file says all controls 0.0300 s" in paragraph(first)
     corrected = parse_aircraft(dump_aircraft(corrected_aircraft(first)))
     assert diagnose(corrected, [other], []).verdict == "no_gap"
+
+
+@pytest.mark.slow
+def test_a_failure_outside_of_the_longest_part_of_an_interrupted_recording_is_found(aircraft) -> None:
+    flown = {"control_effectiveness_loss": {"elevator": 0.5, "onset": 17.0}}
+    with pytest.warns(InputWarning, match="its 2 parts"):
+        parts = interrupted(aircraft, fly(aircraft, flown, seed=16), 14.0, 15.0)
+    assert diagnose(aircraft, parts[:1], []).verdict == "no_gap"
+    found = diagnose(aircraft, parts, [])
+    (cause,) = document(found)["causes"]
+    assert (found.verdict, cause["label"]) == ("explained", "control_effectiveness_loss of elevator")
+    assert cause["parameters"]["onset"][0] == pytest.approx(17.0, abs=0.5)
+    assert cause["parameters"]["elevator"][0] == pytest.approx(0.5, abs=0.05)
 
 
 @pytest.mark.slow

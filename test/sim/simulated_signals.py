@@ -15,7 +15,7 @@ from sysid_node.sim.prediction.signals import MeasuredSignals
 SAMPLES = 601
 
 
-def signals_from(flight: SimulatedFlight, commands: np.ndarray) -> MeasuredSignals:
+def signals_from(flight: SimulatedFlight, commands: np.ndarray, step: float) -> MeasuredSignals:
     outputs, states = np.asarray(flight.outputs), np.asarray(flight.states)
     return MeasuredSignals(
         rates=outputs[:, 3:6],
@@ -23,6 +23,7 @@ def signals_from(flight: SimulatedFlight, commands: np.ndarray) -> MeasuredSigna
         density=np.asarray(air_density(-states[:, 2], np)),
         commands=np.asarray(commands),
         climb=states[0, 2] - states[:, 2],
+        time=step * np.arange(len(outputs)),
     )
 
 

@@ -143,10 +143,10 @@ def _identified(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFram
 
 
 def _diagnosed(path: Path, aircraft: Aircraft, topics: _Topics, frame: BodyFrame) -> None:
-    from sysid_node.gap.flightdata.gap_flight import load_gap_flight  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.gap.flightdata.gap_flight import load_gap_flights, longest  # noqa: PLC0415  # JAX takes its time
     from sysid_node.gap.flightdata.opposite_readings import check_directions  # noqa: PLC0415  # JAX
 
-    check_directions(aircraft, load_gap_flight(path, aircraft, topics, frame))
+    check_directions(aircraft, longest(load_gap_flights(path, aircraft, topics, frame)))
 
 
 def verdicts(found: LogSurvey, refused: Refusals, *, aircraft_known: bool) -> dict[str, str]:

@@ -109,7 +109,6 @@ class Candidate:
 def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list[Candidate]:
     """All effects on which these flights may contain information."""
     found: list[Candidate] = []
-    length = max(model.windows.starts[-1] + model.windows.length for model in models)
     unseen = UNOBSERVABLE | (_OF_VANES if any(model.flight.inferred for model in models) else frozenset())
     unseen |= frozenset() if all(model.axes[CHANNELS.index("CD")] for model in models) else _OF_DRAG
     unseen |= frozenset() if all(model.flight.metered for model in models) else _OF_THRUST
@@ -122,7 +121,7 @@ def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list
         if effect == DERIVATIVE_ERROR:
             found += _per_coefficient(simulator, lateral=any(model.flight.lateral for model in models))
         elif effect in PER_CONTROL:
-            found += _per_control(simulator, effect, length)
+            found += _per_control(simulator, effect, *recorded_span(models))
         else:
             found.append(_whole(simulator, models, effect))
         if effect in SHARED:
@@ -250,10 +249,15 @@ def _per_coefficient(simulator: Simulator, *, lateral: bool) -> list[Candidate]:
     return found
 
 
-def _per_control(simulator: Simulator, effect: str, length: float) -> list[Candidate]:
-    """Candidates of an effect, one for each control, with an onset before or during the flight."""
+def recorded_span(models: Sequence[ResidualModel]) -> tuple[float, float]:
+    """First and last time of flights, s since their recordings began."""
+    return min(float(model.time[0]) for model in models), max(float(model.time[-1]) for model in models)
+
+
+def _per_control(simulator: Simulator, effect: str, first: float, last: float) -> list[Candidate]:
+    """Candidates of an effect, one for each control, with an onset before or between two times of the flight, s."""
     names, candidates = simulator.names, []
-    onsets = (-10.0, *(share * length for share in _ONSETS))
+    onsets = (-10.0, *(first + share * (last - first) for share in _ONSETS))
     for control in simulator.layout.controls:
         fitted = [f"{effect}.{control}"]
         values: list[tuple[float, ...]] = [(0.2,)]

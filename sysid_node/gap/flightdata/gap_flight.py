@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -33,6 +33,7 @@ from sysid_node.flight.record import (
 from sysid_node.flight.streams import Streams
 from sysid_node.gap.flightdata.flow_angles import FilterHistory, missing_flow_angles, run_flow_angle_filter
 from sysid_node.gap.flightdata.thrust import thrust_missing, with_inferred_thrust
+from sysid_node.gap.thresholds import THRESHOLDS
 from sysid_node.sim.prediction.signals import unfiltered_columns
 from sysid_node.sim.signals.low_pass import gaussian_taps, low_passed
 
@@ -77,32 +78,38 @@ class GapFlight:
         return self.command_interval or 1.0 / self.actuator_rate
 
 
-def load_gap_flight(
+def load_gap_flights(
     path: Path,
     aircraft: Aircraft,
     topics: Mapping[str, str] | None,
     frame: BodyFrame,
     carried: str = "auto",
-) -> GapFlight:
-    """The flight of a bag or a log. ``carried``: what the actuators' messages are, as of ``flight_record``.
+) -> list[GapFlight]:
+    """The flight of a bag or a log, in parts where its recording was interrupted (``completed_flights``).
 
-    Raises InputError where it is unreadable, lacks a signal or is too short.
+    ``carried``: what the actuators' messages are, as of ``flight_record``. Raises InputError where the flight is
+    unreadable, lacks a signal or is too short.
     """
     if is_table(path, topics, frame):
         record = _checked(aircraft, read_csv(path, aircraft.control_symbols))
         rate = 1.0 / float(np.median(np.diff(record.time)))
-        return completed_flight(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
-    return flight_of_streams(open_streams(path, aircraft, topics, frame), aircraft, str(path), carried)
+        return completed_flights(aircraft, GapFlight(record, rate, rate, rate, source=str(path)))
+    return flights_of_streams(open_streams(path, aircraft, topics, frame), aircraft, str(path), carried)
 
 
-def flight_of_streams(streams: Streams, aircraft: Aircraft, source: str = "", carried: str = "auto") -> GapFlight:
-    """The flight of recorded messages. Raises InputError where it lacks a signal or is too short."""
+def flights_of_streams(
+    streams: Streams, aircraft: Aircraft, source: str = "", carried: str = "auto"
+) -> list[GapFlight]:
+    """The flight of recorded messages, as ``load_gap_flights`` gives it.
+
+    Raises InputError where it lacks a signal or is too short.
+    """
     Actuation.of(aircraft).require(streams.actuators.names, streams.name)
     # commands are held, but the servos are the simulator's own
     record = _checked(aircraft, flight_record(aircraft, streams, 0.2, carried, servos=False))
     rates = [1e9 / float(np.median(np.diff(s.arrival.stamp_ns))) for s in streams.by_topic.values()]
     flight = GapFlight(record, rates[0], rates[1], rates[2], source=source)
-    return completed_flight(aircraft, replace(flight, command_interval=streams.actuators.interval))
+    return completed_flights(aircraft, replace(flight, command_interval=streams.actuators.interval))
 
 
 def _checked(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
@@ -111,15 +118,61 @@ def _checked(aircraft: Aircraft, record: FlightRecord) -> FlightRecord:
     return changing_readings(aircraft, checked_signs(checked_force(record), opposite_alpha=opposite_alpha))
 
 
-def completed_flight(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
-    """The flight with what was not measured: lateral signals as zeros, flow angles and thrust inferred.
+def completed_flights(aircraft: Aircraft, flight: GapFlight) -> list[GapFlight]:
+    """The flight, in parts where its recording was interrupted, with what was not measured.
 
-    Samples that lack a value of a signal are left out, and only the longest part without an interruption is kept.
-    Raises InputError where another signal is missing, or where the flight is too short.
+    Lateral signals that were not measured are zeros, flow angles and thrust are inferred. Samples that lack a value of
+    a signal are left out. So are parts that are too short, and parts in which no surface moves, unless that holds for
+    all; warns (InputWarning) of what is left out. Raises InputError where a signal is missing that cannot be inferred,
+    or where the flight is too short.
     """
-    record, begin = _longest_run(_complete(aircraft, flight.record, flight.source), flight.source)
-    flight = _with_flow_angles(aircraft, replace(flight, record=record, begin=flight.begin + begin))
-    return _with_thrust(aircraft, _with_lateral(aircraft, flight))
+    record = _complete(aircraft, flight.record, flight.source)
+    parts = [_part(flight, record, rows) for rows in uninterrupted_parts(record.time, _INTERRUPTION)]
+    if len(parts) > 1:
+        parts = _usable(aircraft, parts, record.duration)
+    return [_with_thrust(aircraft, _with_lateral(aircraft, _with_flow_angles(aircraft, part))) for part in parts]
+
+
+def longest(flights: Sequence[GapFlight]) -> GapFlight:
+    """The longest of flights, or of the parts of one."""
+    return max(flights, key=lambda flight: flight.record.duration)
+
+
+def _usable(aircraft: Aircraft, parts: list[GapFlight], duration: float) -> list[GapFlight]:
+    """The parts of an interrupted flight of so many s that can be diagnosed, else the longest; warns of the others."""
+    kept = [p for p in parts if p.record.duration >= SHORTEST_FLIGHT and _surface_moves(aircraft, p.record)]
+    kept = kept or [longest(parts)]
+    seconds = sum(part.record.duration for part in kept)
+    warnings.warn(
+        f"{kept[0].source}: {interrupted_in_words(len(parts))} for more than {_INTERRUPTION:g} s; the gap is measured "
+        f"on {_which(len(kept), len(parts))}, {seconds:.3g} of {duration:.3g} s",
+        InputWarning,
+        stacklevel=2,
+    )
+    return kept
+
+
+def _which(kept: int, parts: int) -> str:
+    """Which of an interrupted flight's parts are used, in words."""
+    if kept == parts:
+        return f"its {parts} parts"
+    used = f"{kept} of its {parts} parts" if kept > 1 else "one part"
+    return f"{used} (the others are shorter than {SHORTEST_FLIGHT:g} s, or no surface moves in them)"
+
+
+def _part(flight: GapFlight, record: FlightRecord, rows: slice) -> GapFlight:
+    """These rows of the flight's record; the part's own time begins at zero."""
+    time, first = record.time[rows], float(record.time[rows][0])
+    columns = {name: values[rows] for name, values in record.columns.items()}
+    start = record.start_ns + round(1e9 * first)
+    part = FlightRecord(time - first, columns, record.name, start, record.rejected, record.commanded)
+    return replace(flight, record=part, begin=flight.begin + first - float(record.time[0]))
+
+
+def _surface_moves(aircraft: Aircraft, record: FlightRecord) -> bool:
+    """Whether a control surface moves as much as a diagnosis needs."""
+    deflections = [record[name] for name in aircraft.control_symbols if record.measured(name)]
+    return any(np.ptp(np.nanpercentile(d, [0.5, 99.5])) >= THRESHOLDS.admission.least_travel for d in deflections)
 
 
 def _complete(aircraft: Aircraft, record: FlightRecord, source: str) -> FlightRecord:
@@ -184,27 +237,6 @@ def with_inferred_signals(aircraft: Aircraft, flight: GapFlight) -> GapFlight:
     if flight.metered:
         return flight
     return replace(flight, record=with_inferred_thrust(aircraft, flight.record))
-
-
-def _longest_run(record: FlightRecord, source: str) -> tuple[FlightRecord, float]:
-    """The longest part without an interruption, and when it begins, s; warns (InputWarning) of what is left out.
-
-    Its own time begins at zero.
-    """
-    parts = uninterrupted_parts(record.time, _INTERRUPTION)
-    keep = max(parts, key=lambda part: part.stop - part.start)
-    if len(parts) > 1:
-        warnings.warn(
-            f"{source}: {interrupted_in_words(len(parts))} for more than {_INTERRUPTION:g} s; the gap is measured on "
-            f"the longest part without interruption, {np.ptp(record.time[keep]):.3g} of {record.duration:.3g} s",
-            InputWarning,
-            stacklevel=2,
-        )
-    columns = {name: values[keep] for name, values in record.columns.items()}
-    time, first = record.time[keep], float(record.time[keep][0])
-    start, commanded = record.start_ns + round(1e9 * first), record.commanded
-    run = FlightRecord(time - first, columns, record.name, start, record.rejected, commanded)
-    return run, first - float(record.time[0])
 
 
 def resampled(flight: GapFlight, rate: float = ANALYSIS_RATE) -> FlightRecord:

@@ -15,7 +15,6 @@ from sysid_node.aircraft.names import LONGITUDINAL, LONGITUDINAL_SIGNALS
 from sysid_node.dynamics.vector import Vector
 from sysid_node.flight.record import Array, FlightRecord
 from sysid_node.gap.flightdata import thrust
-from sysid_node.gap.flightdata.flow_angles import FilterHistory
 from sysid_node.gap.flightdata.gap_flight import GapFlight, resampled
 from sysid_node.gap.flightdata.inferred_flow import filter_steps
 from sysid_node.gap.flightdata.time_scales import highest_frequency
@@ -105,7 +104,7 @@ def noiseless_model(
     memory: ObserverMemory,
 ) -> ResidualModel:
     """The residual model of a record whose sensors' noise is not known: its power is one."""
-    inputs, series = _inputs(simulator, flight.history, record, memory, axes[_VANES])
+    inputs, series = _inputs(simulator, flight, record, memory, axes[_VANES])
     measurement = Measurement(record, windows, series, windows.transform(series), axes)
     return ResidualModel(simulator, flight, measurement, inputs, np.ones((1, len(CHANNELS))))
 
@@ -169,22 +168,25 @@ def _residual_and_slopes(model: ResidualModel, indices: NDArray[np.intp]) -> Com
 
 def _inputs(
     simulator: Simulator,
-    history: FilterHistory | None,
+    flight: GapFlight,
     record: FlightRecord,
     memory: ObserverMemory,
     vanes: NDArray[np.bool_],
 ) -> tuple[PredictionInputs, Array]:
-    """What predictions take from a record, padded, and the measured channels (N, 12); ``vanes`` (2,) were measured."""
-    signals, missing = signals_of(simulator, record), padded_length(len(record)) - len(record)
-    motion = motion_of(record)
+    """What predictions take from a record of a flight, padded, and the measured channels (N, 12).
+
+    ``vanes`` (2,) were measured.
+    """
+    signals, motion = signals_of(simulator, record, flight.begin), motion_of(record)
+    missing = padded_length(len(record)) - len(record)
     signals, motion = (jax.tree.map(lambda x: _padded(x, missing), parts) for parts in (signals, motion))
     accelerations = [Vector(*(_padded(record[name], missing) for name in names)) for names in _ACCELERATIONS]
     forces = joined(_measured_coefficients(simulator.model, signals, Accelerations(*accelerations)), len(record))
     empty = jnp.zeros((len(record) + missing, len(READINGS)))
     read = empty if motion is None else jnp.hstack([motion.air, motion.attitude])
-    if history is not None and motion is not None:
+    if flight.history is not None and motion is not None:
         length = len(record) + missing
-        steps = filter_steps(simulator.aircraft, history, record, simulator.rate, length)
+        steps = filter_steps(simulator.aircraft, flight.history, record, simulator.rate, length)
         motion = motion._replace(inference=steps)
     memories, measured = jax.tree.map(jnp.asarray, memory), jnp.asarray(vanes, float)
     inputs = PredictionInputs(signals, motion, memories, measured, jnp.asarray(simulator.step))

@@ -81,6 +81,11 @@ class ResidualModel:
         return self.measurement.record
 
     @property
+    def time(self) -> Array:
+        """Times (N,) of the samples, s since the recording began."""
+        return np.asarray(self.flight.begin + self.record.time)
+
+    @property
     def windows(self) -> Windows:
         """Windows and lines of the spectra."""
         return self.measurement.windows

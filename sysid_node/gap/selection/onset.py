@@ -10,7 +10,7 @@ import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised
-from sysid_node.gap.estimation.candidates import Candidate
+from sysid_node.gap.estimation.candidates import Candidate, recorded_span
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.instruments.gust_free_signals import command_instruments
 from sysid_node.gap.instruments.moment_equations import limited_step, moment_equations
@@ -37,8 +37,7 @@ def search_onset(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
         return fit
     problem, place = VariableProjection(fit), places[0]
     best = (problem.deviance(fit.values), fit.values)
-    end = max(float(model.record.duration) for model in fit.models)
-    best = _best_of(problem, best, place, np.arange(0.0, end, _COARSE))
+    best = _best_of(problem, best, place, np.arange(*recorded_span(fit.models), _COARSE))
     best = _best_of(problem, best, place, best[1][place] + np.arange(-_REACH, _REACH, _FINE))
     throughout = _at(problem, best[1], place, float(fit.simulator.neutral()[fit.indices[place]]))
     values = throughout[1] if throughout[0] <= best[0] + THRESHOLDS.search.penalty else best[1]
@@ -58,7 +57,7 @@ def onset_uncertainty(fit: CandidateFit, place: int) -> float:
     """
     moving = any(is_gusty(model) for model in fit.models)
     step_s = _COARSE if moving else _LIKELIHOOD_STEP
-    times = np.arange(0.0, max(float(model.record.duration) for model in fit.models), step_s)
+    times = np.arange(*recorded_span(fit.models), step_s)
     if moving:
         deviance = np.array([_command_deviance(fit, place, float(time)) for time in times])
     else:

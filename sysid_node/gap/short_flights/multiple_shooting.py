@@ -45,6 +45,7 @@ class Course(NamedTuple):
     moving: Scalar  # (N, 3) velocity of the air that is added to what the air data show, m/s
     turning: Scalar  # (N, 3) rotation of the air, rad/s
     begins: Scalar  # (N,) whether a short flight begins here
+    time: Scalar  # (N,) s since the recording began
 
 
 _ANGLES = tuple(OUTPUTS.index(name) for name in ("phi", "psi"))
@@ -82,8 +83,8 @@ def fly(layout: ParameterLayout, model: AircraftNumbers, theta: Scalar, course: 
     air = _air(samples, course.begins, step)
     gusts = jnp.concatenate([air + course.moving, course.turning], axis=1)
     starts = _starts(samples, course)
-    first, _ = begin(chain, starts.body[0], arriving[0], gusts[0], ())
-    coming = (starts, gusts, _next(arriving), _next(gusts), step * jnp.arange(1, len(arriving) + 1))
+    first, _ = begin(chain, starts.body[0], arriving[0], gusts[0], (), course.time[0])
+    coming = (starts, gusts, _next(arriving), _next(gusts), course.time + step)
     _, (readings, *_) = jax.lax.scan(lambda carry, new: _advance(chain, carry, *new), first, coming)
     return Readings(readings, _measured(chain, course.motion), air)
 
@@ -162,7 +163,8 @@ def course_of(model: ResidualModel, size: int) -> Course:
     still = jnp.zeros((altitude.size, 3))
     assert given.motion is not None
     assert given.signals.unfiltered is not None
-    return Course(given.motion, given.signals.commands, given.signals.unfiltered, altitude, still, still, begins)
+    commands, unfiltered = given.signals.commands, given.signals.unfiltered
+    return Course(given.motion, commands, unfiltered, altitude, still, still, begins, given.signals.time)
 
 
 @result_type

@@ -100,7 +100,7 @@ def reflown(models: Sequence[ResidualModel], thetas: Sequence[Array], before: Fl
         if not all(np.isfinite(readings).all() for readings in shown):
             return None
         errors = [without_jumps(measured - readings) for readings in shown]
-        flights.append(SideBySide(model.record.time, measured, measured - errors[0], measured - errors[1], begins))
+        flights.append(SideBySide(model.time, measured, measured - errors[0], measured - errors[1], begins))
         tables.append(mean_squares(model, theta, course, measured, [errors[0], errors[0], errors[1]]))
     gap = gap_of_errors(models, tables)
     return None if gap is None else Reflown(gap, tuple(flights))

@@ -45,7 +45,7 @@ class SideBySide:
     Columns are ``sim.model.layout.OUTPUTS``; ``begins`` (N,) marks where short flights begin.
     """
 
-    time: Array  # s
+    time: Array  # s since the recording began
     measured: Array
     before: Array
     after: Array
@@ -126,7 +126,7 @@ def side_by_side(model: ResidualModel, points: Sequence[Array]) -> SideBySide:
     before, after = (
         measured - e for e in (simulation_error(model, neutral, course), errors_by_group(model, points, course))
     )
-    return SideBySide(model.record.time, measured, before, after, np.asarray(course.begins)[: len(measured)])
+    return SideBySide(model.time, measured, before, after, np.asarray(course.begins)[: len(measured)])
 
 
 def _summary(motion: Array, errors: Array, names: list[str]) -> Gap:

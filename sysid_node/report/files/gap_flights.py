@@ -1,10 +1,11 @@
 """``flights.csv`` of a gap's folder: the flights as measured, and as the simulator flies them.
 
-One row a sample, at 50 Hz. Columns: ``flight`` (its place among those on which the gap is measured, from 0), ``time``
-s, ``begins`` (1 where the simulator starts again from the measured state), ``measured_``, ``file_`` (with the aircraft
-file) and ``corrected_`` (with the causes) of each reading, the ``command_`` of each control (rad) and of thrust (N),
-``rho``, and ``missing_file_`` and ``missing_corrected_`` of each coefficient: measured minus predicted. SI and
-radians. Readings of the simulator are empty where no short flight could be flown, for example without roll and pitch.
+One row a sample, at 50 Hz. Columns: ``flight`` (its place among those on which the gap is measured, from 0; parts of
+an interrupted recording count one by one), ``time`` (s since the recording began), ``begins`` (1 where the simulator
+starts again from the measured state), ``measured_``, ``file_`` (with the aircraft file) and ``corrected_`` (with the
+causes) of each reading, the ``command_`` of each control (rad) and of thrust (N), ``rho``, and ``missing_file_`` and
+``missing_corrected_`` of each coefficient: measured minus predicted. SI and radians. Readings of the simulator are
+empty where no short flight could be flown, for example without roll and pitch.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ def _columns(found: Diagnosis, place: int) -> dict[str, Array]:
     left = [(model.series - model.predicted_series(p))[:, :coefficients] for p in (model.simulator.neutral(), point)]
     left = [np.where(model.axes[:coefficients], values, np.nan) for values in left]
     return {
-        "time": record.time,
+        "time": model.time,
         **readings,
         **{f"command_{n}": v for n, v in zip(model.simulator.layout.commands, model.commands.T, strict=True)},
         "rho": record["rho"],

@@ -155,7 +155,7 @@ def _begin(
 ) -> _LiveState:
     chain = Chain.of(layout, model, theta, step, -initial[2])
     commands, gusts = first[:-6], first[-6:]
-    carry, surfaces = begin(chain, initial, commands, gusts, ())
+    carry, surfaces = begin(chain, initial, commands, gusts, (), jnp.zeros_like(chain.step))
     return _LiveState(carry, jnp.tile(commands, (history, 1)), surfaces)
 
 

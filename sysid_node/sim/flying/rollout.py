@@ -100,7 +100,7 @@ def fly(
     time = jnp.arange(inputs.commands.shape[0]) * chain.step
     gusts = airflow.gusts(chain.model, chain.effects, inputs.gusts, inputs.turbulence, time)
     coming = (_next(inputs.commands), _next(gusts), time + chain.step, inputs.noise)
-    carry, surfaces = begin(chain, initial, inputs.commands[0], gusts[0], pilot_state)
+    carry, surfaces = begin(chain, initial, inputs.commands[0], gusts[0], pilot_state, time[0])
     _, rows = jax.lax.scan(lambda c, new: advance(chain, pilot, c, *new), carry, coming)
     readings, states, coefficients, moved = rows
     if samples is not None:
@@ -192,11 +192,16 @@ def _at_probe(chain: Chain, motion: SensedMotion) -> Scalar:
     return jnp.stack(sensors.at_probe(motion.air.velocity, motion.air.rates, arm))
 
 
-def begin(chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_state: Any) -> tuple[StepState, Scalar]:
-    """The state settled on the first sample's command and flow, and its surfaces and thrust (controls + 1,)."""
+def begin(
+    chain: Chain, initial: Scalar, planned: Scalar, gusts: Scalar, pilot_state: Any, time: Scalar
+) -> tuple[StepState, Scalar]:
+    """The state settled on the first sample's command and flow, and the surfaces and thrust (controls + 1,) there.
+
+    ``time`` is that of the sample, s.
+    """
     actuators = actuator.start(chain.model, planned[:-1])
     motor = propulsion.commanded(chain.model, planned[-1])
-    drive, surfaces = drive_of(chain, actuators.position, motor, gusts, jnp.zeros_like(chain.step))
+    drive, surfaces = drive_of(chain, actuators.position, motor, gusts, time)
     x = settled(chain, initial, drive)
     _, motion = derivative(chain, x, drive)
     truth = _at_probe(chain, motion)

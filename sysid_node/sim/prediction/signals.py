@@ -30,6 +30,7 @@ class MeasuredSignals(NamedTuple):
     density: Scalar  # (N,) kg/m^3
     commands: Scalar  # (N, controls + 1) rad, and thrust in N, as recorded
     climb: Scalar  # (N,) m since the start
+    time: Scalar  # (N,) s since the recording began
     #: (N,) m/s, of the CG relative to the air, at the true times; replaces what follows from ``air`` where it is given.
     velocity: Vector | None = None
     alpha_rate: Scalar | None = None  # (N,) rad/s; replaces the difference quotient of alpha where it is given
@@ -48,10 +49,11 @@ def unfiltered_columns(name: str) -> tuple[str, ...]:
     return tuple(f"{name}_unfiltered_{i}" for i in range(COMMANDS_PER_SAMPLE))
 
 
-def signals_of(simulator: Simulator, record: FlightRecord) -> MeasuredSignals:
+def signals_of(simulator: Simulator, record: FlightRecord, begin: float = 0.0) -> MeasuredSignals:
     """The signals of a record at the simulator's rate, by cubic interpolation; commands by linear interpolation.
 
-    A record that was low-passed has the rate of the simulator already. Raises InputError where rates, airspeed, flow
+    A record that was low-passed has the rate of the simulator already. Its time is zero ``begin`` s after the recording
+    began. Raises InputError where rates, airspeed, flow
     angles, density, a control or the thrust of an aircraft with an engine is missing.
     """
     thrust = () if simulator.aircraft.throttle is None else ("thrust",)
@@ -72,6 +74,7 @@ def signals_of(simulator: Simulator, record: FlightRecord) -> MeasuredSignals:
         density=jnp.asarray(smooth["rho"]),
         commands=jnp.asarray(np.column_stack(commands)),
         climb=jnp.asarray(_climb(record, time)),
+        time=jnp.asarray(begin + time),
         unfiltered=_unfiltered(simulator, record),
     )
 

@@ -28,7 +28,7 @@ class TrueMotion(NamedTuple):
     climb: Scalar  # m since the start
     alpha_rate: Scalar  # rad/s
     air_rotation: Vector  # of the air, as far as the aircraft feels it, rad/s
-    time: Scalar  # s since the start
+    time: Scalar  # s since the recording began
 
 
 def true_motion(chain: Chain, signals: MeasuredSignals) -> TrueMotion:
@@ -51,7 +51,7 @@ def true_motion(chain: Chain, signals: MeasuredSignals) -> TrueMotion:
         climb=signals.climb,
         alpha_rate=slope(alpha, step) if signals.alpha_rate is None else signals.alpha_rate,
         air_rotation=_air_rotation(chain, signals),
-        time=jnp.arange(signals.density.shape[0]) * step,
+        time=signals.time,
     )
 
 

@@ -154,7 +154,7 @@ def test_the_verdict_is_what_the_commands_do(tmp_path, capsys, kind):
     ``identify`` takes long without vanes, which MAVROS has none of; the test of its methods below is of such a flight.
     """
     from sysid_node.errors import InputError  # noqa: PLC0415
-    from sysid_node.gap.flightdata.gap_flight import load_gap_flight  # noqa: PLC0415
+    from sysid_node.gap.flightdata.gap_flight import load_gap_flights  # noqa: PLC0415
 
     make, outputs, takers = FLIGHTS[kind]
     path = make(tmp_path)
@@ -171,7 +171,7 @@ def test_the_verdict_is_what_the_commands_do(tmp_path, capsys, kind):
     else:
         done["identify"] = main(["identify", *common, str(tmp_path / "id"), "--method", "equation_error"]) == 0
     try:
-        load_gap_flight(path, known, None, "flu")
+        load_gap_flights(path, known, None, "flu")
         done["gap"] = True
     except InputError:
         done["gap"] = False

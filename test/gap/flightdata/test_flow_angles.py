@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gap_flights import whole
 
 from sysid_node.errors import InputError
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
+from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import CHANNELS
 from sysid_node.gap.short_flights.multiple_shooting import course_of, simulation_error
@@ -21,7 +22,7 @@ from sysid_node.sim import Simulator
 def blind(aircraft, flight: GapFlight, *lost: str) -> GapFlight:
     """The flight as an aircraft without these instruments has it."""
     columns = {**flight.record.columns, **{name: np.full(len(flight.record), np.nan) for name in lost}}
-    return completed_flight(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
+    return whole(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
 
 
 @pytest.fixture(scope="module")

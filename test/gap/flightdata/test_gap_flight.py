@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gap_flights import whole
 
 from sysid_node import load
 from sysid_node.aircraft.load import load_aircraft
@@ -16,9 +17,9 @@ from sysid_node.flight.record import FlightRecord
 from sysid_node.gap.flightdata.gap_flight import (
     ANALYSIS_RATE,
     GapFlight,
-    completed_flight,
-    flight_of_streams,
-    load_gap_flight,
+    completed_flights,
+    flights_of_streams,
+    load_gap_flights,
     resampled,
 )
 from sysid_node.sim import Simulator
@@ -104,71 +105,84 @@ def test_a_heading_through_south_is_not_smeared(plain) -> None:
     np.testing.assert_allclose(jumping, whole, atol=1e-9)
 
 
-def test_only_the_longest_part_without_an_interruption_is_kept(aircraft, time) -> None:
-    flight = flight_with(aircraft)
-    interrupted = time + 3.0 * (time > 6.0)
-    with pytest.warns(InputWarning, match=r"once for more than 0\.2 s; .* longest part .*, [\d.]+ of [\d.]+ s"):
-        kept = completed_flight(aircraft, replace(flight, record=replace(flight.record, time=interrupted)))
-    assert kept.record.duration == pytest.approx(DURATION - 6.0, abs=2.0 / RATE)
-    assert kept.record.time[0] == 0.0
+def interrupted(aircraft: Aircraft, time: np.ndarray, pauses: dict[float, float], moved: np.ndarray) -> GapFlight:
+    """A flight whose recording pauses at these times for so many s; ``moved`` (N,) is its elevator, rad."""
+    later = time + sum(seconds * (time > at) for at, seconds in pauses.items())
+    flight = flight_with(aircraft, de=moved)
+    return replace(flight, record=replace(flight.record, time=later))
+
+
+def test_the_parts_between_interruptions_are_flights(aircraft, time) -> None:
+    elevator = 0.1 * np.sin(time)
+    with pytest.warns(InputWarning, match=r"once for more than 0\.2 s; .* on its 2 parts, 20 of 23 s"):
+        first, second = completed_flights(aircraft, interrupted(aircraft, time, {8.0: 3.0}, elevator))
+    assert (first.record.duration, second.record.duration) == pytest.approx((8.0, 12.0), abs=2.0 / RATE)
+    assert first.record.time[0] == second.record.time[0] == 0.0
+    assert (first.begin, second.begin) == pytest.approx((0.0, 11.0), abs=2.0 / RATE)
+    assert (second.record.start_ns - first.record.start_ns) * 1e-9 == pytest.approx(second.begin)
+    np.testing.assert_array_equal(np.concatenate([first.record["de"], second.record["de"]]), elevator)
 
 
 @pytest.mark.parametrize("seconds", [0.25, 0.45])
 def test_nothing_is_interpolated_across_an_interruption(aircraft, time, seconds: float) -> None:
-    flight = flight_with(aircraft)
-    interrupted = time + seconds * (time > 6.0)
     with pytest.warns(InputWarning, match="interrupted once"):
-        kept = completed_flight(aircraft, replace(flight, record=replace(flight.record, time=interrupted)))
-    assert kept.record.duration == pytest.approx(max(6.0, DURATION - 6.0), abs=2.0 / RATE)
+        parts = completed_flights(aircraft, interrupted(aircraft, time, {6.5: seconds}, 0.1 * np.sin(time)))
+    assert [part.record.duration for part in parts] == pytest.approx([6.5, DURATION - 6.5], abs=2.0 / RATE)
+
+
+def test_short_parts_and_those_without_a_moving_surface_are_left_out(aircraft, time) -> None:
+    """The first part is short, in the second no surface moves."""
+    flight = interrupted(aircraft, time, {4.0: 1.0, 12.0: 1.0}, 0.1 * np.sin(time) * (time > 12.0))
+    with pytest.warns(InputWarning, match=r"one part \(the others are shorter than 6 s, or .*\), 7\.99 of 22 s"):
+        [kept] = completed_flights(aircraft, flight)
+    assert kept.begin == pytest.approx(14.0, abs=2.0 / RATE)
+
+
+def test_where_no_part_can_be_used_the_longest_says_why(aircraft, time) -> None:
+    pauses = {4.0: 1.0, 9.0: 1.0, 14.5: 1.0}
+    flight = interrupted(aircraft, time, pauses, 0.1 * np.sin(time))
+    with pytest.warns(InputWarning), pytest.raises(InputError, match=r"5\.5 s of flight without interruption"):
+        completed_flights(aircraft, flight)
 
 
 def test_a_few_missing_samples_are_bridged_within_the_noise(aircraft, time) -> None:
     """Truth: a constant rate. A spline would continue the slope that the noise of two samples makes."""
     noisy = 0.01 * np.random.default_rng(3).normal(size=time.size)
-    whole = flight_with(aircraft, q=noisy)
+    complete = flight_with(aircraft, q=noisy)
     kept = ~((time > 5.0) & (time < 5.15))
-    columns = {name: values[kept] for name, values in whole.record.columns.items()}
-    holed = replace(whole, record=replace(whole.record, time=time[kept], columns=columns))
-    assert completed_flight(aircraft, holed).record.duration == pytest.approx(whole.record.duration)
+    columns = {name: values[kept] for name, values in complete.record.columns.items()}
+    holed = replace(complete, record=replace(complete.record, time=time[kept], columns=columns))
+    assert whole(aircraft, holed).record.duration == pytest.approx(complete.record.duration)
     assert np.abs(resampled(holed)["q"]).max() < 0.03
 
 
 @pytest.mark.parametrize("name", ["beta", "alpha", "thrust", "de"])
 def test_samples_without_a_value_are_left_out(aircraft, time, name: str) -> None:
     """Truth: the same flight without these samples."""
-    whole = flight_with(aircraft)
+    complete = flight_with(aircraft)
     lost = (time > 5.0) & (time < 5.1)
-    columns = {**whole.record.columns, name: np.where(lost, np.nan, whole.record[name])}
+    columns = {**complete.record.columns, name: np.where(lost, np.nan, complete.record[name])}
     with pytest.warns(InputWarning, match=rf": 19 of 4001 samples lack a value of {name}, and are left out"):
-        kept = completed_flight(aircraft, replace(whole, record=replace(whole.record, columns=columns)))
+        kept = whole(aircraft, replace(complete, record=replace(complete.record, columns=columns)))
     assert kept.lateral and not kept.inferred and not kept.filled
     np.testing.assert_array_equal(kept.record.time, time[~lost])
-    np.testing.assert_array_equal(kept.record["q"], whole.record["q"][~lost])
+    np.testing.assert_array_equal(kept.record["q"], complete.record["q"][~lost])
 
 
 def test_a_long_time_without_a_value_is_an_interruption(aircraft, time) -> None:
-    whole = flight_with(aircraft)
-    columns = {**whole.record.columns, "V": np.where((time > 5.0) & (time < 5.5), np.nan, whole.record["V"])}
+    complete = flight_with(aircraft, de=0.1 * np.sin(time))
+    columns = {**complete.record.columns, "V": np.where((time > 7.0) & (time < 7.5), np.nan, complete.record["V"])}
     with pytest.warns(InputWarning) as said:
-        kept = completed_flight(aircraft, replace(whole, record=replace(whole.record, columns=columns)))
+        parts = completed_flights(aircraft, replace(complete, record=replace(complete.record, columns=columns)))
     assert [str(one.message).split(";")[0].split(": ")[1] for one in said] == [
         "99 of 4001 samples lack a value of V, and are left out",
         "the recording is interrupted once for more than 0.2 s",
     ]
-    assert kept.record.duration == pytest.approx(DURATION - 5.5, abs=2.0 / RATE)
-
-
-def test_a_part_knows_when_it_begins(aircraft, time) -> None:
-    flight = flight_with(aircraft)
-    interrupted = time + 3.0 * (time > 2.0)
-    with pytest.warns(InputWarning, match="interrupted once"):
-        kept = completed_flight(aircraft, replace(flight, record=replace(flight.record, time=interrupted)))
-    assert kept.begin == pytest.approx(5.0, abs=2.0 / RATE)
-    assert (kept.record.start_ns - flight.record.start_ns) * 1e-9 == pytest.approx(kept.begin)
+    assert [part.record.duration for part in parts] == pytest.approx([7.0, DURATION - 7.5], abs=2.0 / RATE)
 
 
 def test_lateral_signals_that_were_not_measured_are_zero(aircraft) -> None:
-    flight = completed_flight(aircraft, without(flight_with(aircraft), "ay", "p", "r", "beta"))
+    flight = whole(aircraft, without(flight_with(aircraft), "ay", "p", "r", "beta"))
     assert not flight.lateral and set(flight.filled) == {"ay", "p", "r", "beta"}
     assert not flight.record["ay"].any() and flight.record["q"].all()
 
@@ -176,7 +190,7 @@ def test_lateral_signals_that_were_not_measured_are_zero(aircraft) -> None:
 @pytest.mark.parametrize("name", ["az", "V", "de"])
 def test_a_signal_that_is_needed_is_named(aircraft, name: str) -> None:
     with pytest.raises(InputError, match=rf"no complete {name}"):
-        completed_flight(aircraft, without(flight_with(aircraft), name))
+        whole(aircraft, without(flight_with(aircraft), name))
 
 
 @pytest.mark.slow
@@ -185,7 +199,7 @@ def test_a_slow_logs_commands_keep_their_interval_apart_from_the_rate_of_the_lin
     """Truth: the log's own rate. A rate of messages is not that at which steps were logged."""
     simulator = Simulator(aircraft, 100.0)
     streams = FlightSampler(100.0, 100.0, logged).record(fly_sortie(simulator, np.zeros((1001, 4))))
-    flight = flight_of_streams(replace(streams, actuators=between_commands(streams.actuators)), aircraft)
+    [flight] = flights_of_streams(replace(streams, actuators=between_commands(streams.actuators)), aircraft)
     assert flight.step_interval == pytest.approx(1.0 / logged, rel=0.02)
     assert flight.actuator_rate > 150.0
 
@@ -196,9 +210,10 @@ def test_a_flight_with_a_dead_sensor_is_refused(tmp_path) -> None:
     for name, beta in (("sound", record["beta"]), ("dead", np.full(len(record), 0.01))):
         write_csv(tmp_path / f"{name}.csv", replace(record, columns={**record.columns, "beta": beta}))
     known = load_aircraft("cdrw")
-    assert load_gap_flight(tmp_path / "sound.csv", known, None, "flu").lateral
+    [sound] = load_gap_flights(tmp_path / "sound.csv", known, None, "flu")
+    assert sound.lateral
     with pytest.raises(InputError, match="dead: sideslip: no change for 10 s: a dead sensor"):
-        load_gap_flight(tmp_path / "dead.csv", known, None, "flu")
+        load_gap_flights(tmp_path / "dead.csv", known, None, "flu")
 
 
 def test_a_flight_that_is_too_short_is_refused(aircraft, time) -> None:
@@ -206,4 +221,4 @@ def test_a_flight_that_is_too_short_is_refused(aircraft, time) -> None:
     columns = {name: values[time < 5.0] for name, values in flight.record.columns.items()}
     short = replace(flight, record=FlightRecord(time[time < 5.0], columns))
     with pytest.raises(InputError, match=r"5\.0 s of flight without interruption; the gap needs 6 s or more"):
-        completed_flight(aircraft, short)
+        whole(aircraft, short)

@@ -5,11 +5,11 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from gap_flights import RATE, fly
+from gap_flights import RATE, fly, whole
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight, resampled
+from sysid_node.gap.flightdata.gap_flight import GapFlight, resampled
 from sysid_node.gap.flightdata.inferred_flow import filter_steps
 from sysid_node.gap.flightdata.manoeuvre_window import cut_to_manoeuvre
 from sysid_node.gap.flightdata.time_scales import highest_frequency
@@ -28,7 +28,7 @@ ANALYSIS = 50.0  # Hz
 def blind(aircraft, flight: GapFlight, *lost: str) -> GapFlight:
     """The flight as an aircraft without these vanes has it."""
     columns = {**flight.record.columns, **{name: np.full(len(flight.record), np.nan) for name in lost}}
-    return completed_flight(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
+    return whole(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
 
 
 def model_of(aircraft, flight: GapFlight) -> ResidualModel:

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_flights import fly
+from gap_flights import fly, whole
 
 from bench.gap.spikes import gap_flight
 from bench.spikes.records import FLIGHTS, belief, part
 from sysid_node.errors import InputError, InputWarning
-from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
+from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.flightdata.opposite_readings import check_directions
 
 #: Flights that are taken are taken without a word.
@@ -63,7 +63,7 @@ def test_a_lateral_accelerometer_of_the_wrong_sign_is_said(aircraft, plain) -> N
 def test_it_is_said_without_vanes(aircraft, plain) -> None:
     reversed_aileron = changed(plain, {"da": -1.0, **NO_VANES})
     with pytest.raises(InputError, match="is aileron counted the other way"):
-        check_directions(aircraft, completed_flight(aircraft, reversed_aileron))
+        check_directions(aircraft, whole(aircraft, reversed_aileron))
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])

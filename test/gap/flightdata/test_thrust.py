@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gap_flights import whole
 
 from sysid_node.aircraft.model import LookupTable
 from sysid_node.errors import InputError
 from sysid_node.gap.estimation.candidates import candidates_of
-from sysid_node.gap.flightdata.gap_flight import GapFlight, completed_flight
+from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.residuals.residual_model import CHANNELS
 from sysid_node.sim import Simulator
@@ -20,7 +21,7 @@ from sysid_node.sim import Simulator
 def without_thrust(aircraft, flight: GapFlight) -> GapFlight:
     """The flight as it is recorded where nobody meters the engine."""
     columns = {**flight.record.columns, "thrust": np.full(len(flight.record), np.nan)}
-    return completed_flight(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
+    return whole(aircraft, replace(flight, record=replace(flight.record, columns=columns)))
 
 
 def test_thrust_is_what_the_files_drag_leaves(aircraft, plain) -> None:
@@ -47,7 +48,7 @@ def test_a_thrust_that_most_samples_lack_is_refused(aircraft, plain) -> None:
     thrust[: 2 * thrust.size // 3] = np.nan
     holed = replace(plain.record, columns={**plain.record.columns, "thrust": thrust})
     with pytest.raises(InputError, match="no complete thrust"):
-        completed_flight(aircraft, replace(plain, record=holed))
+        whole(aircraft, replace(plain, record=holed))
 
 
 def test_drag_in_a_table_counts_as_drag_in_a_derivative(aircraft, plain) -> None:

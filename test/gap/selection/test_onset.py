@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from gap_flights import fly
+from gap_flights import fly, interrupted
 
 from sysid_node.aircraft.model import Aircraft
+from sysid_node.errors import InputWarning
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, unfitted, with_candidates
 from sysid_node.gap.estimation.candidates import Candidate, candidates_of
 from sysid_node.gap.estimation.convergence import converged
@@ -46,6 +47,23 @@ def test_what_was_lost_before_the_surface_moved_was_lost_before_the_flight(aircr
     found = converged(search_onset(far, candidate))
     assert found.values[begin] == pytest.approx(-10.0)
     assert found.values[loss] == pytest.approx(0.5, abs=0.02)
+
+
+def test_an_onset_in_a_later_part_of_a_recording_counts_from_its_beginning(aircraft) -> None:
+    """The parts are of 9 and 15 s; the failure is 7 s after the second begins."""
+    effects = {"control_effectiveness_loss": {"elevator": 0.5, "onset": 18.0}}
+    with pytest.warns(InputWarning, match="interrupted once"):
+        parts = interrupted(aircraft, fly(aircraft, effects, seed=15), 9.0, 11.0)
+    models = [residual_model_of(Simulator(aircraft, 50.0), part) for part in parts]
+    nuisances = nuisances_of(aircraft, models[0], models, fitted_with=models[1:])
+    (candidate,) = (
+        c for c in candidates_of(models[0].simulator, models) if c.label == "control_effectiveness_loss of elevator"
+    )
+    fit = converged(with_candidates(unfitted(models, nuisances), [candidate], nuisances, (0.2, 4.0)))
+    found = converged(search_onset(fit, candidate))
+    loss, onset = (found.indices.index(i) for i in candidate.indices)
+    assert found.values[onset] == pytest.approx(18.0, abs=0.5)
+    assert found.values[loss] == pytest.approx(0.5, abs=0.03)
 
 
 @pytest.mark.slow

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from gap_flights import interrupted
 
+from sysid_node.errors import InputWarning
 from sysid_node.gap.residuals.build import residual_model_of
 from sysid_node.gap.short_flights.multiple_shooting import course_of, simulate_beside, simulation_error
+from sysid_node.sim import Simulator
 from sysid_node.sim.model.layout import OUTPUTS
 
 SIZE = 100  # samples at 50 Hz: 2 s
@@ -57,3 +60,17 @@ def test_a_rate_limit_of_the_true_size_fits_best(make_flight, plain_model) -> No
         for rate in (0.36, 0.4, 0.44)
     )
     assert true.std() < 0.6 * min(slower.std(), faster.std())
+
+
+def test_a_surface_that_fails_in_a_later_part_of_a_recording_fails_there(aircraft, make_flight) -> None:
+    """Truth: the onset flown, which counts from the recording's beginning; 7 s later most of the part is without it."""
+    flown = {"control_effectiveness_loss": {"elevator": 0.5, "onset": 12.0}}
+    with pytest.warns(InputWarning, match="interrupted once"):
+        part = interrupted(aircraft, make_flight(flown, seed=15), 9.0, 10.0)[1]
+    model = residual_model_of(Simulator(aircraft, 50.0), part)
+    course, pitch = course_of(model, 100), OUTPUTS.index("q")
+    right, late = (
+        simulation_error(model, model.simulator.vector({"control_effectiveness_loss": loss}), course)
+        for loss in ({"elevator": 0.5, "onset": 12.0}, {"elevator": 0.5, "onset": 19.0})
+    )
+    assert right[:, pitch].std() < 0.5 * late[:, pitch].std()

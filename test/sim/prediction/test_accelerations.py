@@ -22,7 +22,7 @@ def test_effects_without_acting_parameters_may_be_left_out(fast, effect):
             theta[i] += 0.5 * parameter.scale
     trim = trim_flight(fast)
     inputs = smooth_inputs(fast, trim)
-    signals = signals_from(fast.rollout(fast.neutral(), trim.initial, inputs), inputs.commands)
+    signals = signals_from(fast.rollout(fast.neutral(), trim.initial, inputs), inputs.commands, fast.step)
     expected = partial(
         predict_accelerations, fast.layout, fast.model, jnp.asarray(theta), signals, jnp.asarray(fast.step)
     )

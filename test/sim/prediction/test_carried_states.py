@@ -31,7 +31,7 @@ def test_actuators_and_motor_are_those_of_a_rollout(fast):
     inputs = smooth_inputs(fast, trim)
     flight = fast.rollout(theta, trim.initial, inputs)
     chain = Chain.of(fast.layout, fast.model, jnp.asarray(theta), jnp.asarray(fast.step), jnp.zeros(()))
-    motion = true_motion(chain, signals_from(flight, inputs.commands))
+    motion = true_motion(chain, signals_from(flight, inputs.commands, fast.step))
     states = carried_states(chain, motion, partial(effect_acts, fast.layout, jnp.asarray(theta != fast.neutral())))
     np.testing.assert_allclose(np.column_stack([states.actuators, states.motor]), flight.surfaces, atol=1e-12)
     assert np.ptp(np.asarray(states.actuators), axis=0).min() > 0.01

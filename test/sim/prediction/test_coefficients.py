@@ -44,7 +44,7 @@ def test_prediction_expects_what_the_rollout_shows(fast, effect):
     trim = trim_flight(fast)
     inputs = smooth_inputs(fast, trim)
     flight = fast.rollout(theta, trim.initial, inputs)
-    signals = signals_from(flight, inputs.commands)
+    signals = signals_from(flight, inputs.commands, fast.step)
     measured = shown(fast, flight, signals)[INNER]
     expected = predicted_coefficients(fast, theta, signals)[INNER]
     neutral = predicted_coefficients(fast, fast.neutral(), signals)[INNER]
@@ -59,7 +59,7 @@ def test_neutral_prediction_is_the_true_coefficients(fast):
     trim = trim_flight(fast)
     inputs = smooth_inputs(fast, trim)
     flight = fast.rollout(fast.neutral(), trim.initial, inputs)
-    expected = predicted_coefficients(fast, fast.neutral(), signals_from(flight, inputs.commands))
+    expected = predicted_coefficients(fast, fast.neutral(), signals_from(flight, inputs.commands, fast.step))
     np.testing.assert_allclose(expected, flight.coefficients, atol=1e-10)
 
 
@@ -70,7 +70,7 @@ def test_turbulence_does_no_harm(fast):
     trim = trim_flight(fast)
     inputs = smooth_inputs(fast, trim)._replace(gusts=gusts)
     flight = fast.rollout(fast.neutral(), trim.initial, inputs)
-    expected = predicted_coefficients(fast, fast.neutral(), signals_from(flight, inputs.commands))
+    expected = predicted_coefficients(fast, fast.neutral(), signals_from(flight, inputs.commands, fast.step))
     np.testing.assert_allclose(expected, flight.coefficients, atol=1e-10)
 
 
@@ -81,7 +81,7 @@ def test_slopes_agree_with_finite_differences(fast):
     theta = fast.neutral()
     for i, (_, parameter) in enumerate(fast.parameters):
         theta[i] = np.clip(parameter.neutral + 0.313 * fast.scales[i], parameter.lower, parameter.upper)
-    signals = signals_from(fast.rollout(fast.neutral(), trim.initial, inputs), inputs.commands)
+    signals = signals_from(fast.rollout(fast.neutral(), trim.initial, inputs), inputs.commands, fast.step)
     slopes = coefficient_slopes(fast, theta, signals)
     for i, name in enumerate(fast.names):
         h = np.zeros(len(theta))

@@ -15,7 +15,7 @@ def test_signals_of_a_record(simulator):
     trim = trim_flight(simulator)
     inputs = simulator.inputs(trim.command + three_axes(SAMPLES, simulator.step))
     flight = simulator.rollout(simulator.neutral(), trim.initial, inputs)
-    direct = signals_from(flight, inputs.commands)
+    direct = signals_from(flight, inputs.commands, simulator.step)
     outputs, commands = np.asarray(flight.outputs), np.asarray(inputs.commands)
     columns = dict(zip(simulator.outputs, outputs.T, strict=True)) | {"rho": np.asarray(direct.density)}
     columns |= dict(zip(("de", "da", "dr", "thrust"), commands.T, strict=True))

@@ -49,6 +49,6 @@ def test_response_stays_bounded(slope, frequency):
         theta[slow.names.index(f"structural_mode.{name}")] = value
     trim = trim_flight(slow)
     inputs = smooth_inputs(slow, trim)
-    signals = signals_from(slow.rollout(slow.neutral(), trim.initial, inputs), inputs.commands)
+    signals = signals_from(slow.rollout(slow.neutral(), trim.initial, inputs), inputs.commands, slow.step)
     without, expected = (np.abs(predicted_coefficients(slow, t, signals)).max() for t in (slow.neutral(), theta))
     assert expected < 3.0 * without

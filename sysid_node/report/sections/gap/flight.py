@@ -95,7 +95,7 @@ def _coefficients(found: Diagnosis) -> list[Panel]:
     panels = []
     for k in np.flatnonzero(model.axes & (force | mended)):
         shown = [x[:, k] - force[k] * (x[:, k].mean() - model.series[:, k].mean()) for x in (before, after)]
-        panels.append(_panel(CHANNELS[k], model.record.time, model.series[:, k], *shown))
+        panels.append(_panel(CHANNELS[k], model.time, model.series[:, k], *shown))
     return panels
 
 
