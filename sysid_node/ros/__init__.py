@@ -31,6 +31,16 @@ def find_packages() -> None:
         os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
 
 
+def leave_shared_memory() -> None:
+    """Let Fast DDS send by UDP alone, unless the environment names other transports (FASTDDS_BUILTIN_TRANSPORTS).
+
+    Its shared memory does not stand a process that is killed: one that takes its place at once may never hear a
+    message, because a publisher that clears up what the first has left removes what the second has made (Fast DDS's
+    issues 5053 and 5469, request 4728).
+    """
+    os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+
+
 def end_quietly() -> None:
     """Let SIGINT and SIGTERM end this process at once with code 0, where it is one of the ``PROGRAMS`` that starts.
 
@@ -48,3 +58,4 @@ def end_quietly() -> None:
 end_quietly()
 one_thread_for_linear_algebra()  # before a node's module imports NumPy
 find_packages()
+leave_shared_memory()  # before rclpy begins
