@@ -116,6 +116,7 @@ ANY = st.floats(allow_nan=True, allow_infinity=True)
 def test_whatever_an_autopilot_sends_it_goes_on(
     standard: tuple[AdapterNode, Any, Any], values: tuple[float, ...], seconds: int, nanoseconds: int
 ) -> None:
+    """What goes wrong in a callback is raised by ``spin_once``."""
     node, imu, pressure = standard
     header = Header(stamp=Time(sec=seconds, nanosec=nanoseconds))
     axes = [dict(zip("xyz", values[i : i + 3], strict=True)) for i in (0, 3)]

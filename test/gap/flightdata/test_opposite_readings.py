@@ -1,5 +1,6 @@
 """Surfaces and side forces that are recorded the other way; truth: the readings that were turned around."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +13,18 @@ from sysid_node.errors import InputError, InputWarning
 from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.flightdata.opposite_readings import check_directions
 
-#: Flights that are taken are taken without a word.
-pytestmark = pytest.mark.filterwarnings("error::sysid_node.errors.InputWarning")
-
 NO_VANES = {"alpha": np.nan, "beta": np.nan}
+
+
+def said_of(aircraft, flight: GapFlight) -> list[str]:
+    """What is said of a flight that is refused or warned of; nothing of one that is taken."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", InputWarning)
+        try:
+            check_directions(aircraft, flight)
+        except InputError as error:
+            return [str(error)]
+    return [str(one.message) for one in caught if issubclass(one.category, InputWarning)]
 
 
 def changed(flight: GapFlight, factors: dict[str, float]) -> GapFlight:
@@ -69,20 +78,20 @@ def test_it_is_said_without_vanes(aircraft, plain) -> None:
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_a_flight_with_surfaces_of_another_effect_is_taken(aircraft, plain, in_gusts, factor) -> None:
     for flight in (plain, in_gusts):
-        check_directions(aircraft, changed(flight, dict.fromkeys(("de", "da", "dr"), factor)))
+        assert said_of(aircraft, changed(flight, dict.fromkeys(("de", "da", "dr"), factor))) == []
 
 
 def test_periodic_commands_in_gusts_are_not_taken_for_reversed_ones(aircraft) -> None:
     """With half a period of delay they fit as well, and with the other sign."""
     flight = fly(aircraft, {}, seed=12, turbulence="moderate", manoeuvre=["multisine"], duration=40.0)
-    check_directions(aircraft, flight)
+    assert said_of(aircraft, flight) == []
 
 
 @pytest.mark.parametrize("seconds", [0.1, 0.25, 0.4])
 def test_late_surfaces_are_not_taken_for_reversed_ones(aircraft, plain, in_gusts, seconds) -> None:
     """Steps of 0.3 s look reversed after 0.25 s; `sysid gap` names how late they are."""
     for flight in (plain, in_gusts):
-        check_directions(aircraft, recorded_early(flight, ["de", "da", "dr"], seconds))
+        assert said_of(aircraft, recorded_early(flight, ["de", "da", "dr"], seconds)) == []
 
 
 @pytest.mark.parametrize("seconds", [0.05, 0.1, 0.15])
@@ -91,7 +100,7 @@ def test_late_surfaces_of_a_real_flight_are_not_taken_for_reversed_ones(flights,
     flight = FLIGHTS["thor"]
     aircraft = belief(flights, flight)
     as_recorded = gap_flight(aircraft, part(flights, flight, flight.fitted[0]), "thor")
-    check_directions(aircraft, recorded_early(as_recorded, ["de", "da", "dr"], seconds))
+    assert said_of(aircraft, recorded_early(as_recorded, ["de", "da", "dr"], seconds)) == []
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
@@ -99,7 +108,7 @@ def test_real_flights_are_taken(flights, name) -> None:
     flight = FLIGHTS[name]
     aircraft = belief(flights, flight)
     for span in (*flight.fitted, *flight.held):
-        check_directions(aircraft, gap_flight(aircraft, part(flights, flight, span), name))
+        assert said_of(aircraft, gap_flight(aircraft, part(flights, flight, span), name)) == []
 
 
 def test_the_elevator_of_a_real_flight_counted_the_other_way_is_said(flights) -> None:
