@@ -23,7 +23,7 @@ unexport PYTHONPATH PYTHONHOME LD_LIBRARY_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_P
 export PATH := $(BIN):$(PATH)
 export VIRTUAL_ENV := $(VENV_DIR)
 export AMENT_PREFIX_PATH := $(VENV_DIR)
-export FASTRTPS_DEFAULT_PROFILES_FILE := $(abspath config/fast_discovery.xml)
+export FASTRTPS_DEFAULT_PROFILES_FILE := $(abspath config/local_udp.xml)
 export OMP_NUM_THREADS := 1
 
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements/constraints.txt

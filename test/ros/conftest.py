@@ -13,9 +13,10 @@ if find_spec("rclpy") is None:
     collect_ignore_glob = ["test_*.py", "support/test_*.py"]
 else:
     import rclpy
-    from harness import ROOT, Probe, made_up_streams
+    from harness import Probe, made_up_streams
 
     import sysid_node.ros  # finds sysid_msgs in a virtual environment
+    from sysid_node.cli.live.ros_domain import own_domain
 
 
 @pytest.fixture(scope="session")
@@ -25,8 +26,7 @@ def ros() -> Iterator[None]:
     worker = os.environ.get("PYTEST_XDIST_WORKER", "")
     run = os.getppid() if worker else os.getpid()  # workers of one run have one parent
     os.environ["ROS_DOMAIN_ID"] = str(1 + (3 * run + int(worker.removeprefix("gw") or 0)) % 100)
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(ROOT / "config" / "fast_discovery.xml")
+    own_domain()
     rclpy.init(args=["--ros-args", "-p", "autostart:=false"])
     yield
     rclpy.try_shutdown()

@@ -1,4 +1,4 @@
-"""A virtual environment that holds ROS packages names itself to ROS, and nothing else is touched."""
+"""What importing the nodes' package sets in the environment, and what it leaves as it was."""
 
 import os
 import subprocess
@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from harness import Probe, ended, start
 
 from sysid_node.ros import find_packages
 
@@ -31,3 +32,28 @@ def test_linear_algebra_of_the_nodes_has_one_thread() -> None:
     kept = {k: v for k, v in os.environ.items() if k not in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")}
     done = subprocess.run([sys.executable, "-c", program], env=kept, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["1", "False"]
+
+
+@pytest.mark.parametrize("named", [None, "DEFAULT"])
+def test_nodes_leave_shared_memory_where_no_other_transports_are_named(named: str | None) -> None:
+    program = "import os, sysid_node.ros; print(os.environ['FASTDDS_BUILTIN_TRANSPORTS'])"
+    kept = {k: v for k, v in os.environ.items() if k != "FASTDDS_BUILTIN_TRANSPORTS"}
+    named_too = kept if named is None else {**kept, "FASTDDS_BUILTIN_TRANSPORTS": named}
+    done = subprocess.run([sys.executable, "-c", program], env=named_too, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == (named or "UDPv4")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+@pytest.mark.parametrize("profile", [True, False])
+def test_a_node_has_no_shared_memory_of_fast_dds(probe: Probe, profile: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Truth: the memory of its process, by the profile of this computer alone, and without a profile."""
+    if not profile:
+        monkeypatch.delenv("FASTRTPS_DEFAULT_PROFILES_FILE")
+        monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
+    with ended(start("identifier", "--ros-args", "-p", "aircraft:=cdrw")) as node:
+        if profile:
+            probe.await_identifier()
+        maps = Path(f"/proc/{node.pid}/maps")
+        probe.until(lambda: "libfastrtps" in maps.read_text(encoding="utf-8"))
+        probe.spin(2.0)
+        assert "/dev/shm/fastrtps" not in maps.read_text(encoding="utf-8")

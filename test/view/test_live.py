@@ -1,6 +1,5 @@
 """The live view over DDS: what is published stands in the recording."""
 
-import os
 from importlib.util import find_spec
 from time import monotonic
 
@@ -12,17 +11,13 @@ if find_spec("rclpy") is None:
     pytest.skip("ROS is not installed", allow_module_level=True)
 
 import rclpy
-
-import sysid_node.ros  # finds sysid_msgs in a virtual environment
-
-os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData, DerivativeEstimate, DerivativeEstimates
 
+import sysid_node.ros  # finds sysid_msgs in a virtual environment
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.cli.live.ros_domain import own_domain
 from sysid_node.online import types
 from sysid_node.ros.support.conversion import header
 from sysid_node.ros.support.flight_watch import FlightWatch
@@ -30,6 +25,7 @@ from sysid_node.view.live import LiveScene
 from sysid_node.view.recording import append, open_file, say
 
 assert sysid_node.ros
+own_domain()
 START = 1_700_000_000_000_000_000
 
 

@@ -1,6 +1,5 @@
 """Transforms and markers over DDS, where their message packages are installed (there are none on PyPI)."""
 
-import os
 from importlib.util import find_spec
 
 import pytest
@@ -11,22 +10,19 @@ if not all(find_spec(name) for name in ("rclpy", *NEEDED)):
     pytest.skip(f"not all installed: rclpy, {', '.join(NEEDED)}", allow_module_level=True)
 
 import rclpy
-
-import sysid_node.ros  # finds sysid_msgs in a virtual environment
-
-os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-
 from sensor_msgs.msg import Imu, JointState
 from sysid_msgs.msg import AirData
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
+import sysid_node.ros  # finds sysid_msgs in a virtual environment
 from sysid_node.aircraft.load import load_aircraft
+from sysid_node.cli.live.ros_domain import own_domain
 from sysid_node.ros.support.conversion import header
 from sysid_node.ros.support.flight_watch import FlightWatch
 
 assert sysid_node.ros
+own_domain()
 
 
 def test_published_transforms_and_markers() -> None:

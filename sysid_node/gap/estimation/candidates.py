@@ -121,7 +121,7 @@ def candidates_of(simulator: Simulator, models: Sequence[ResidualModel]) -> list
         if effect == DERIVATIVE_ERROR:
             found += _per_coefficient(simulator, lateral=any(model.flight.lateral for model in models))
         elif effect in PER_CONTROL:
-            found += _per_control(simulator, effect, *recorded_span(models))
+            found += _per_control(simulator, effect, models)
         else:
             found.append(_whole(simulator, models, effect))
         if effect in SHARED:
@@ -249,13 +249,9 @@ def _per_coefficient(simulator: Simulator, *, lateral: bool) -> list[Candidate]:
     return found
 
 
-def recorded_span(models: Sequence[ResidualModel]) -> tuple[float, float]:
-    """First and last time of flights, s since their recordings began."""
-    return min(float(model.time[0]) for model in models), max(float(model.time[-1]) for model in models)
-
-
-def _per_control(simulator: Simulator, effect: str, first: float, last: float) -> list[Candidate]:
-    """Candidates of an effect, one for each control, with an onset before or between two times of the flight, s."""
+def _per_control(simulator: Simulator, effect: str, models: Sequence[ResidualModel]) -> list[Candidate]:
+    """Candidates of an effect, one for each control, with an onset before or during the flights."""
+    first, last = min(float(model.time[0]) for model in models), max(float(model.time[-1]) for model in models)
     names, candidates = simulator.names, []
     onsets = (-10.0, *(first + share * (last - first) for share in _ONSETS))
     for control in simulator.layout.controls:

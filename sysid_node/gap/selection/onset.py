@@ -6,16 +6,19 @@ tried, with one step of all other parameters at each: first coarsely, then finel
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sysid_node.flight.record import Array
 from sysid_node.gap.estimation.candidate_fit import CandidateFit, linearised
-from sysid_node.gap.estimation.candidates import Candidate, recorded_span
+from sysid_node.gap.estimation.candidates import Candidate
 from sysid_node.gap.estimation.variable_projection import VariableProjection
 from sysid_node.gap.instruments.gust_free_signals import command_instruments
 from sysid_node.gap.instruments.moment_equations import limited_step, moment_equations
 from sysid_node.gap.residuals.air_motion import is_gusty
 from sysid_node.gap.residuals.parameter_priors import bounds
+from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS
 
 #: Coarse and fine steps between the times that are tried, and how far about the best the fine ones reach, s.
@@ -37,7 +40,7 @@ def search_onset(fit: CandidateFit, candidate: Candidate) -> CandidateFit:
         return fit
     problem, place = VariableProjection(fit), places[0]
     best = (problem.deviance(fit.values), fit.values)
-    best = _best_of(problem, best, place, np.arange(*recorded_span(fit.models), _COARSE))
+    best = _best_of(problem, best, place, onset_times(fit.models, _COARSE)[0])
     best = _best_of(problem, best, place, best[1][place] + np.arange(-_REACH, _REACH, _FINE))
     throughout = _at(problem, best[1], place, float(fit.simulator.neutral()[fit.indices[place]]))
     values = throughout[1] if throughout[0] <= best[0] + THRESHOLDS.search.penalty else best[1]
@@ -57,14 +60,29 @@ def onset_uncertainty(fit: CandidateFit, place: int) -> float:
     """
     moving = any(is_gusty(model) for model in fit.models)
     step_s = _COARSE if moving else _LIKELIHOOD_STEP
-    times = np.arange(*recorded_span(fit.models), step_s)
+    times, widths = onset_times(fit.models, step_s)
     if moving:
         deviance = np.array([_command_deviance(fit, place, float(time)) for time in times])
     else:
         problem = VariableProjection(fit)
         deviance = np.array([_at(problem, fit.values, place, float(time))[0] for time in times])
-    weight = np.exp(-0.5 * (deviance - deviance.min()))
-    return float(np.sqrt(np.average((times - fit.values[place]) ** 2, weights=weight) + step_s**2 / 12.0))
+    weight = widths * np.exp(-0.5 * (deviance - deviance.min()))
+    return float(np.sqrt(np.average((times - fit.values[place]) ** 2 + widths**2 / 12.0, weights=weight)))
+
+
+def onset_times(models: Sequence[ResidualModel], step: float) -> tuple[Array, Array]:
+    """Times (K,) at which an effect may have set in, s since the recordings began, and how long (K,) each stands for.
+
+    They are a ``step`` apart within the flights. A pause of a recording is one time, its middle.
+    """
+    within = [np.arange(model.flight.begin, model.flight.begin + model.record.duration, step) for model in models]
+    times = np.unique(np.concatenate(within))
+    before = times[:-1][np.diff(times) > 2.0 * step]
+    after = times[1:][np.diff(times) > 2.0 * step]
+    times = np.sort(np.concatenate([times, 0.5 * (before + after)]))
+    edges = 0.5 * (times[1:] + times[:-1])
+    widths = np.diff(edges, prepend=times[0] - 0.5 * step, append=times[-1] + 0.5 * step)
+    return times, np.asarray(widths)
 
 
 def _command_deviance(fit: CandidateFit, place: int, time: float) -> float:

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 def loop(*arguments: str) -> subprocess.CompletedProcess[str]:
     """`sysid loop` in a domain of its own."""
-    environment = {**os.environ, "FASTRTPS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "fast_discovery.xml")}
+    environment = {**os.environ, "FASTRTPS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "local_udp.xml")}
     environment.pop("ROS_DOMAIN_ID", None)
     command = [sys.executable, "-m", "sysid_node.cli", "loop", *arguments]
     return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)

@@ -12,7 +12,7 @@ from sysid_node.gap.estimation.convergence import converged
 from sysid_node.gap.estimation.nuisances import nuisances_of
 from sysid_node.gap.instruments.liml import liml_estimate
 from sysid_node.gap.residuals.build import residual_model_of
-from sysid_node.gap.selection.onset import search_onset
+from sysid_node.gap.selection.onset import onset_times, search_onset
 from sysid_node.gap.validation.standard_errors import standard_errors
 from sysid_node.sim import Simulator
 
@@ -64,6 +64,22 @@ def test_an_onset_in_a_later_part_of_a_recording_counts_from_its_beginning(aircr
     loss, onset = (found.indices.index(i) for i in candidate.indices)
     assert found.values[onset] == pytest.approx(18.0, abs=0.5)
     assert found.values[loss] == pytest.approx(0.5, abs=0.03)
+
+
+def test_a_pause_of_a_recording_is_one_time_that_stands_for_all_of_it(aircraft) -> None:
+    """Parts of 9 and 15 s about a pause of 2 s; without a pause the times are as far apart as is asked for."""
+    whole = fly(aircraft, {}, seed=15)
+    with pytest.warns(InputWarning, match="interrupted once"):
+        parts = interrupted(aircraft, whole, 9.0, 11.0)
+    models = [residual_model_of(Simulator(aircraft, 50.0), part) for part in parts]
+    times, widths = onset_times(models, 0.5)
+    assert ((times > 9.0) & (times < 11.0)).sum() == 1
+    np.testing.assert_allclose(widths.sum(), times[-1] - times[0] + 0.5)
+    assert widths.max() == pytest.approx(widths[(times > 9.0) & (times < 11.0)][0])
+    np.testing.assert_allclose(np.median(np.diff(times)), 0.5)
+    alone, even = onset_times([residual_model_of(Simulator(aircraft, 50.0), whole)], 0.5)
+    np.testing.assert_allclose(alone, np.arange(0.0, whole.record.duration, 0.5))
+    np.testing.assert_allclose(even, 0.5)
 
 
 @pytest.mark.slow
