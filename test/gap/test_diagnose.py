@@ -12,7 +12,9 @@ from sysid_node.errors import InputError, InputWarning
 from sysid_node.gap.correction import corrected_aircraft
 from sysid_node.gap.diagnose import diagnose
 from sysid_node.gap.document import document
+from sysid_node.gap.validation.simulation_error import side_by_side
 from sysid_node.report.pages.gap_page import write_gap_report
+from sysid_node.report.sections.gap.flight import most_off
 from sysid_node.report.sections.gap.paragraph import paragraph
 
 
@@ -74,6 +76,10 @@ def test_a_failure_outside_of_the_longest_part_of_an_interrupted_recording_is_fo
     assert (found.verdict, cause["label"]) == ("explained", "control_effectiveness_loss of elevator")
     assert cause["parameters"]["onset"][0] == pytest.approx(17.0, abs=0.5)
     assert cause["parameters"]["elevator"][0] == pytest.approx(0.5, abs=0.05)
+    begin, end = found.where[0]["window_s"]
+    assert 15.0 < begin < end < 26.0  # the second part holds most of the gap
+    evidence = zip(found.models, found.check.corrected.flights, strict=True)
+    assert most_off([side_by_side(model, flight.points) for model, flight in evidence]).time[0] >= 15.0
 
 
 @pytest.mark.slow

@@ -94,8 +94,8 @@ def _power(residuals: Sequence[Complex]) -> Array:
 
 
 def _when(models: Sequence[ResidualModel], residuals: Sequence[Complex], axis: int) -> dict[str, Any]:
-    """Band, time and regime that hold most of what a channel's residuals are, on the longest of the fitted flights."""
-    model, residual = max(zip(models, residuals, strict=True), key=lambda pair: pair[0].windows.count)
+    """Band, time and regime that hold most of what a channel's residuals are, on the flight that holds most of it."""
+    model, residual = max(zip(models, residuals, strict=True), key=lambda pair: power_of(pair[1])[axis])
     power = np.abs(residual[:, 1:, axis]) ** 2
     by_line, by_window = power.sum(axis=0), power.sum(axis=1)
     low, high = shortest_run(np.bincount(model.windows.bands[1:], by_line, len(BAND_EDGES) - 1).astype(float))

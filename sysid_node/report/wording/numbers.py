@@ -39,6 +39,11 @@ def number(value: float, digits: int = 3) -> str:
     return _power(value / 10.0**exponent, digits - 1, exponent)
 
 
+def percentage(value: float) -> str:
+    """So many per cent, without the sign: three significant digits, and no more than one decimal."""
+    return number(round(value, 1), 3)
+
+
 def likely(probability: float) -> str:
     """A probability in two decimals, never as 0 or 1: ``0.83``, ``over 0.99``, ``under 0.01``."""
     if probability >= 0.995:

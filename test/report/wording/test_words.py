@@ -35,6 +35,11 @@ def test_number(value, text):
     assert numbers.number(value).replace("\u202f", " ") == text
 
 
+@pytest.mark.parametrize(("value", "text"), [(92.43, "92.4"), (1.54e-5, "0"), (100.0, "100"), (-3.06, "−3.10")])
+def test_percentage(value, text):
+    assert numbers.percentage(value) == text
+
+
 def test_number_says_when_there_is_none():
     assert numbers.number(math.nan) == numbers.NONE
 

@@ -21,7 +21,7 @@ from sysid_node.report.wording.names import symbol
 from sysid_node.sim.model.layout import OUTPUTS
 from sysid_node.sim.prediction.coefficients import COEFFICIENTS
 
-#: Longest part of the flight that is drawn, s: the part with the largest errors of the aircraft file.
+#: Longest part of a flight that is drawn, s: the part with the largest errors of the aircraft file.
 _DRAWN = 24.0
 
 #: Ratio of a reading's errors before and after the correction from which it is drawn beside forces and moments.
@@ -54,9 +54,16 @@ def flight_figures(found: Diagnosis) -> list[tuple[str, Figure]]:
 
 def _short_flights(found: Diagnosis) -> list[Panel]:
     """The readings that moved; each short flight is a separate line."""
-    place = next(k for k, model in enumerate(found.models) if can_be_simulated(model))
-    record = side_by_side(found.models[place], found.check.corrected.flights[place].points)
-    return short_flight_panels(record, list(found.size.per_channel))
+    flights = zip(found.models, found.check.corrected.flights, strict=True)
+    records = [side_by_side(model, evidence.points) for model, evidence in flights if can_be_simulated(model)]
+    return short_flight_panels(most_off(records), list(found.size.per_channel))
+
+
+def most_off(records: Sequence[SideBySide]) -> SideBySide:
+    """The flight with the largest errors of the simulation before the correction, over their size in all flights."""
+    columns = [OUTPUTS.index(name) for name in READINGS]
+    powers = np.array([((each.before - each.measured)[:, columns] ** 2).mean(axis=0) for each in records])
+    return records[int((powers / np.maximum(powers.mean(axis=0), 1e-300)).sum(axis=1).argmax())]
 
 
 def short_flight_panels(

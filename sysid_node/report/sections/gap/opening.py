@@ -11,7 +11,7 @@ from sysid_node.gap.validation.spectral_error import STAGES
 from sysid_node.report.sections.gap.paragraph import paragraph
 from sysid_node.report.wording.causes import MEASURED_ON, WORDS, percent
 from sysid_node.report.wording.names import words_of
-from sysid_node.report.wording.numbers import number
+from sysid_node.report.wording.numbers import number, percentage
 from sysid_node.sim.signals.low_pass import CORNER
 
 #: The stages of a gap's error, in words.
@@ -23,11 +23,11 @@ def opening(found: Diagnosis, warnings: Sequence[str] = ()) -> Mapping[str, Any]
     gap, model = found.size, found.models[0]
     low, high = gap.ci95
     length = f"{length_of(found.models[0]):g}" if found.simulation_gap else f"{found.models[0].windows.length:.2g}"
-    ends = f" ({number(low, 3)} to {number(high, 3)})" if low < high else ""  # equal where nothing scatters
+    ends = f" ({percentage(low)} to {percentage(high)})" if low < high else ""  # equal where nothing scatters
     facts = [
         ("Verdict", words_of(found.verdict)),
         *((words, percent(getattr(gap, stage))) for words, stage in zip(_STAGE_WORDS, STAGES, strict=True)),
-        ("Closed", f"{number(gap.shrink_percent, 3)} %{ends}"),
+        ("Closed", f"{percentage(gap.shrink_percent)} %{ends}"),
     ]
     return {
         "text": paragraph(found),

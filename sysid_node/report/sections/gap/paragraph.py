@@ -23,7 +23,7 @@ from sysid_node.report.wording.causes import (
     percent,
     units_of,
 )
-from sysid_node.report.wording.numbers import likely, number, with_interval
+from sysid_node.report.wording.numbers import likely, number, percentage, with_interval
 
 #: Readings that together are an aircraft's response about an axis.
 _RESPONSES = {
@@ -122,10 +122,10 @@ def _correction(found: Diagnosis, condition: str) -> str:
     if gap.after > 0.95 * gap.before:
         return f"{condition} the error on {flight} is {percent(gap.after)} of the motion. {floor}"
     # all that is left counts as noise: nothing scatters
-    interval = f" (95 % interval {number(low, 3)} to {number(high, 3)})" if low < high else ""
+    interval = f" (95 % interval {percentage(low)} to {percentage(high)})" if low < high else ""
     return (
         f"{condition} the error on {flight} falls from {percent(gap.before)} to {percent(gap.after)} of the motion, "
-        f"which closes {number(gap.shrink_percent, 3)} %{interval} of the gap above the noise. {floor}"
+        f"which closes {percentage(gap.shrink_percent)} %{interval} of the gap above the noise. {floor}"
     )
 
 

@@ -8,9 +8,9 @@ from typing import Any
 from sysid_node.gap.diagnose import Diagnosis
 from sysid_node.gap.reflying import InSimulator
 from sysid_node.gap.short_flights.readings import length_of
-from sysid_node.report.sections.gap.flight import short_flight_panels
+from sysid_node.report.sections.gap.flight import most_off, short_flight_panels
 from sysid_node.report.wording.causes import WORDS, label_words, percent
-from sysid_node.report.wording.numbers import number
+from sysid_node.report.wording.numbers import percentage
 
 _STAGES = ("before", "after", "noise_floor")
 
@@ -27,9 +27,11 @@ def reflown(found: Diagnosis, flown: InSimulator) -> Mapping[str, Any]:
     return {
         **content,
         "flown": True,
-        "closed": f"{number(gap.shrink_percent, 3)} % ({number(low, 3)} to {number(high, 3)})",
+        "closed": f"{percentage(gap.shrink_percent)} % ({percentage(low)} to {percentage(high)})",
         "rows": rows,
         "whole": ("all together", *(percent(getattr(gap, stage)) for stage in _STAGES)),
         "held_out": found.held_out,
-        "panels": short_flight_panels(flown.result.flights[0], list(gap.per_channel), ("as it was", "corrected")),
+        "panels": short_flight_panels(
+            most_off(flown.result.flights), list(gap.per_channel), ("as it was", "corrected")
+        ),
     }

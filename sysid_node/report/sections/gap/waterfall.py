@@ -26,15 +26,17 @@ _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, "#E69F00", "#56B4E9", "#CC79A7", "#9
 
 def where(found: Diagnosis) -> Mapping[str, Any]:
     """The waterfall by station and axis, and a table of the largest steps."""
+    names = dict.fromkeys(w["flight"] for w in found.where)
+    several = len(names) > 1
     rows = [
         (w["station"], WORDS[w["axis"]], percent(w["share"]),
          "{} to {} Hz".format(*(number(x, 2) for x in w["band_hz"])),
-         "{} to {} s".format(*(number(x, 3) for x in w["window_s"])),
+         "{} to {} s".format(*(number(x, 3) for x in w["window_s"])) + (f" of {w['flight']}" if several else ""),
          ", ".join(_span(name, *ends) for name, ends in w["regime"].items()))
         for w in found.where[:8]
     ]  # fmt: skip
-    unknown, flown = found.verdict == "unknown_effect", next((w["flight"] for w in found.where), "")
-    return {"figure": waterfall(found), "rows": rows, "unknown": unknown, "flight": flown}
+    flight = "" if several else next(iter(names), "")
+    return {"figure": waterfall(found), "rows": rows, "unknown": found.verdict == "unknown_effect", "flight": flight}
 
 
 def _span(name: str, low: float, high: float) -> str:
