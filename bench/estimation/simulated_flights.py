@@ -76,6 +76,7 @@ class Setting:
     name: str
     turbulence: str = "none"
     autopilot: bool = True
+    stiffness: float = 1.0  # times the gains of the simulator's own autopilot
     seconds: float = 60.0
     manoeuvre: Sequence[str] = ()  # none: multistep, or without the autopilot doublets
     effects: Effects = field(default_factory=dict)
@@ -111,7 +112,7 @@ def fly(aircraft: str, setting: Setting, seeds: Sequence[int]) -> Batch:
     flown = setting.manoeuvre or usual(setting.seconds)
     plan = parse_manoeuvre(flown, simulator.aircraft, RATE, setting.seconds)
     commands = jnp.asarray(trim.command + np.column_stack([plan.surfaces(), np.zeros(plan.time.size)]))
-    pilot = autopilot_for(simulator, trim) if setting.autopilot else None
+    pilot = _stiffer(autopilot_for(simulator, trim), setting.stiffness) if setting.autopilot else None
 
     def one(gusts: Any, noise: Any) -> Any:
         inputs = simulator.inputs(commands, turbulence=gusts, noise=noise)
@@ -123,6 +124,11 @@ def fly(aircraft: str, setting: Setting, seeds: Sequence[int]) -> Batch:
     for i in range(len(seeds)):
         simulator.check(jax.tree.map(lambda x, i=i: x[i], flights))
     return Batch(plan.time, _samples(np.asarray(flights.outputs), np.asarray(flights.surfaces), flights.states))
+
+
+def _stiffer(pilot: Autopilot, factor: float) -> Autopilot:
+    """The autopilot with so many times its gains; its authority stays."""
+    return pilot._replace(gains=factor * pilot.gains, integral=factor * pilot.integral)
 
 
 def _flown(

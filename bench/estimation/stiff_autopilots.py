@@ -1,0 +1,93 @@
+"""Whether intervals hold where an autopilot answers gusts with loops stiffer than those of the simulator's own.
+
+    python -m bench.estimation.stiff_autopilots --page docs/results/intervals.md
+
+Flights of two minutes in light and moderate turbulence, with manoeuvres on top of the autopilot's commands. The file is
+exact and the surfaces are measured, so that nothing but the loops may move an estimate. Of all aircraft, airs and seeds
+of a row: how many derivatives are valid, how many of their 95 % intervals hold, and how many estimates are far off.
+"""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from bench.estimation.answering_surfaces import judged
+from bench.estimation.convergence import ALL, PEAKS
+from bench.estimation.judging import exact, processes
+from bench.estimation.simulated_flights import Setting, fly
+from bench.pages import publish, table
+from sysid_node.aircraft.load import load_aircraft
+from sysid_node.errors import InputError
+from sysid_node.online.replay import run_to_end
+from sysid_node.online.settings import OnlineSettings
+
+AIRCRAFT, AIRS, STIFFNESSES = ("cdrw", "cdfp", "kestrel"), ("light", "moderate"), (1.0, 2.0, 4.0, 8.0)
+SECONDS = 120.0
+
+Counts = tuple[int, int, int, int]
+
+
+def doublets(every: float) -> tuple[str, ...]:
+    """One on each surface in turn, as often as it fits."""
+    count = int((SECONDS - 5.0) / every)
+    return tuple(
+        f"doublet:{surface}:amplitude={peak}:width=0.35:start={5.0 + i * every / 3.0}:every={every}:repeat={count}"
+        for i, (surface, peak) in enumerate(PEAKS.items())
+    )
+
+
+def multisines() -> tuple[str, ...]:
+    """On all surfaces at once."""
+    peaks = ",".join(f"{peak:.3g}" for peak in PEAKS.values())
+    return (f"multisine:{ALL.split(':')[0]}:amplitude={peaks}:length=20:low=0.1:high=2:start=0.7:every=22:repeat=5",)
+
+
+MANOEUVRES = {"3-2-1-1s": (), "multisines": multisines(), "doublets every 20 s": doublets(20.0)}
+
+
+def counted(stiffness: float, manoeuvre: str, seeds: list[int], flown: tuple[str, str]) -> Counts | None:
+    """Derivatives, those valid, those of these that hold, and those far off, of some flights; None: they diverge."""
+    aircraft, air = flown
+    known = exact(load_aircraft(aircraft))
+    setting = Setting("", air, stiffness=stiffness, seconds=SECONDS, manoeuvre=MANOEUVRES[manoeuvre])
+    try:
+        batch = fly(aircraft, setting, seeds)
+    except InputError:
+        return None
+    ends = [run_to_end(known, OnlineSettings(), batch.time, one, batch.time[-1:])[0][-1] for one in batch.samples]
+    count, valid, hold, far = np.sum([judged(known, end) for end in ends], axis=0).tolist()
+    return count, valid, hold, far
+
+
+def row(manoeuvre: str, stiffness: float, found: list[Counts]) -> list[str]:
+    """Of flights that did not diverge."""
+    count, valid, hold, far = np.sum(found, axis=0)
+    shares = (valid / count, hold / max(valid, 1), far / max(valid, 1))
+    return [manoeuvre, f"{stiffness:g}", str(len(found)), *(f"{100.0 * share:.1f} %" for share in shares)]
+
+
+def main() -> None:
+    """Print the table, or put it in the documentation."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--first", type=int, default=11, help="seed of the first flight (default: 11)")
+    parser.add_argument("--flights", type=int, default=3, help="in each setting (default: 3)")
+    parser.add_argument("--page", type=Path, help="Markdown file whose section to fill")
+    args = parser.parse_args()
+    seeds, rows = list(range(args.first, args.first + args.flights)), []
+    with processes() as pool:
+        for manoeuvre, stiffness in product(MANOEUVRES, STIFFNESSES):
+            work = partial(counted, stiffness, manoeuvre, seeds)
+            found = [counts for counts in pool.map(work, product(AIRCRAFT, AIRS)) if counts is not None]
+            rows.append(row(manoeuvre, stiffness, found))
+            print(*rows[-1], flush=True)
+    heads = ("manoeuvres", "times the gains", "aircraft and airs", "valid", "hold", "> 4 s.e.")
+    publish("bench/estimation/stiff_autopilots.py", table(heads, rows), args.page)
+
+
+if __name__ == "__main__":
+    main()
