@@ -45,9 +45,9 @@ _ARROW_COLOURS = ((VERMILION, PURPLE), (SKY, GREEN))
 
 
 def scene_of_gap(folder: Path, content: Mapping[str, Any], aircraft: Aircraft | None) -> Scene:
-    """The first flight on which the gap was measured. Raises InputError where its table is missing."""
+    """The longest flight on which the gap was measured. Raises InputError where its table is missing."""
     flights = read_flights(folder / FLIGHTS)
-    flight = flights[0]
+    flight = max(flights, key=lambda each: each.time.size)
     record = _measured(flight)
     arrows, shape = _arrows(flight, record, aircraft), shape_of_aircraft(aircraft)
     return Scene(
@@ -183,7 +183,7 @@ def _about(content: Mapping[str, Any], flights: int, arrows: list[Arrow]) -> str
         ),
     ]
     if flights > 1:
-        words.append(f"The first of {flights} flights is shown.")
+        words.append(f"The longest of {flights} flights, or parts of flights, is shown.")
     return "\n\n".join(words)
 
 
