@@ -3,7 +3,7 @@
 A diagnosis would explain a surface that is counted the other way by late commands, or not at all, and positions from -1
 to 1 by wrong inertias, and it would take its time. So it is told before, by least squares of moments and side force on
 flow angle, rates and surfaces (Klein & Morelli (2006), Aircraft System Identification, ch. 5). Gusts and noise make
-these estimates smaller; late surfaces may turn their signs.
+these estimates smaller; surfaces that are recorded at another time than they act may turn their signs.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ from sysid_node.gap.flightdata.time_scales import analysis_rate, highest_frequen
 _LONGITUDINAL = {"Cm": ("alpha", "q")}
 _ALL = {**_LONGITUDINAL, **dict.fromkeys(("Cl", "Cn", "CY"), ("beta", "p", "r"))}
 
-#: By how much (s) surfaces may follow what is recorded of them: so late, steps of half a second look reversed.
-_LATE = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
+#: By how much (s) surfaces may act after they are recorded, or before, where their stamps are late: steps of half a
+#: second look reversed 0.25 s late, and a fast aircraft's motion 0.1 s early.
+_LATE = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, -0.05, -0.1, -0.15, -0.2)
 
 _STILL = 1e-6  # rad
 
@@ -44,9 +45,10 @@ class _Equation(NamedTuple):
     step: float
 
     def fitted(self, late: float) -> Regression:
-        """The equation with surfaces that act ``late`` s after they were recorded, from a time on that all share."""
-        first, delay = round(_LATE[-1] / self.step), round(late / self.step)
-        kept, moved = self.values[first:], self.values[first - delay : len(self.values) - delay]
+        """The equation with surfaces that act ``late`` s after they were recorded, in the time that all share."""
+        first, delay = round(max(_LATE) / self.step), round(late / self.step)
+        last = len(self.values) + round(min(_LATE) / self.step)
+        kept, moved = self.values[first:last], self.values[first - delay : last - delay]
         split = 1 + len(self.names) - self.surfaces
         return regress(self.names, [kept[:, 0]], [np.hstack([kept[:, 1:split], moved[:, split:]])])
 

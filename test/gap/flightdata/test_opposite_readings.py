@@ -9,6 +9,7 @@ from gap_flights import fly, whole
 
 from bench.gap.spikes import gap_flight
 from bench.spikes.records import FLIGHTS, belief, part
+from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError, InputWarning
 from sysid_node.gap.flightdata.gap_flight import GapFlight
 from sysid_node.gap.flightdata.opposite_readings import check_directions
@@ -92,6 +93,13 @@ def test_late_surfaces_are_not_taken_for_reversed_ones(aircraft, plain, in_gusts
     """Steps of 0.3 s look reversed after 0.25 s; `sysid gap` names how late they are."""
     for flight in (plain, in_gusts):
         assert said_of(aircraft, recorded_early(flight, ["de", "da", "dr"], seconds)) == []
+
+
+@pytest.mark.parametrize("seconds", [0.05, 0.1])
+def test_surfaces_with_late_stamps_are_not_taken_for_reversed_ones(seconds) -> None:
+    """A fast aircraft's motion is over before the surfaces seem to move."""
+    fast = load_aircraft("kestrel")
+    assert said_of(fast, recorded_early(fly(fast, {}, seed=5), ["de", "da", "dr"], -seconds)) == []
 
 
 @pytest.mark.parametrize("seconds", [0.05, 0.1, 0.15])
