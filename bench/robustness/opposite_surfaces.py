@@ -31,7 +31,7 @@ from sysid_node.gap.flightdata.opposite_readings import check_directions
 
 _SURFACES = ("de", "da", "dr")
 _NO_VANES = {"alpha": math.nan, "beta": math.nan}
-_LATE = (0.1, 0.2, 0.4)  # s
+_LATE = (0.1, 0.2, 0.4, -0.05, -0.1)  # s; negative: before they are recorded, with late stamps
 
 #: The factors of the readings, by what is wrong.
 _MISTAKES: Mapping[str, Mapping[str, float]] = {
@@ -59,7 +59,11 @@ def main() -> None:
     rows = [(wrong, *(_count(flights, factors) for flights in groups.values())) for wrong, factors in _MISTAKES.items()]
     rows.append(("positions from -1 to 1", *(_count(flights, None) for flights in groups.values())))
     rows += [
-        (f"surfaces act {late:g} s late", *(_count(flights, {}, late) for flights in groups.values())) for late in _LATE
+        (
+            f"surfaces act {abs(late):g} s {'late' if late > 0.0 else 'early'}",
+            *(_count(flights, {}, late) for flights in groups.values()),
+        )
+        for late in _LATE
     ]
     heads = ("what is wrong", *(f"{name} ({len(flights)})" for name, flights in groups.items()))
     publish("bench/robustness/opposite_surfaces.py", table(heads, rows), args.page)

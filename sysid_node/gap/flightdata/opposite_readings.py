@@ -29,9 +29,12 @@ from sysid_node.gap.flightdata.time_scales import analysis_rate, highest_frequen
 _LONGITUDINAL = {"Cm": ("alpha", "q")}
 _ALL = {**_LONGITUDINAL, **dict.fromkeys(("Cl", "Cn", "CY"), ("beta", "p", "r"))}
 
-#: By how much (s) surfaces may act after they are recorded, or before, where their stamps are late: steps of half a
-#: second look reversed 0.25 s late, and a fast aircraft's motion 0.1 s early.
-_LATE = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, -0.05, -0.1, -0.15, -0.2)
+#: By how much (s) surfaces may follow what is recorded of them: so late, steps of half a second look reversed.
+_LATE = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
+
+#: By how much (s) they may act before they are recorded, where their stamps are late: a fast aircraft's motion then
+#: looks reversed.
+_EARLY = (0.05, 0.075, 0.1, 0.15, 0.2)
 
 _STILL = 1e-6  # rad
 
@@ -46,8 +49,8 @@ class _Equation(NamedTuple):
 
     def fitted(self, late: float) -> Regression:
         """The equation with surfaces that act ``late`` s after they were recorded, in the time that all share."""
-        first, delay = round(max(_LATE) / self.step), round(late / self.step)
-        last = len(self.values) + round(min(_LATE) / self.step)
+        first, delay = round(_LATE[-1] / self.step), round(late / self.step)
+        last = len(self.values) - round(_EARLY[-1] / self.step)
         kept, moved = self.values[first:last], self.values[first - delay : last - delay]
         split = 1 + len(self.names) - self.surfaces
         return regress(self.names, [kept[:, 0]], [np.hstack([kept[:, 1:split], moved[:, split:]])])
@@ -67,8 +70,11 @@ def check_directions(aircraft: Aircraft, flight: GapFlight) -> None:
         return
     delayed = _estimates(aircraft, equations, _LATE)
     name = flight.source or "the flight"
-    if reversed_controls(aircraft, undelayed) and (wrong := reversed_controls(aircraft, delayed)):
-        raise InputError(f"{name}: {'; '.join(wrong)}")
+    if reversed_controls(aircraft, undelayed) and reversed_controls(aircraft, delayed):
+        moved = _estimates(aircraft, equations, (*_LATE, *(-seconds for seconds in _EARLY)))
+        agreed = {n: each for n, each in delayed.items() if each.value * moved[n].value > 0.0}
+        if wrong := reversed_controls(aircraft, agreed):
+            raise InputError(f"{name}: {'; '.join(wrong)}")
     if other_readings(aircraft, undelayed) and (doubtful := other_readings(aircraft, delayed)):
         warnings.warn(f"{name}: {'; '.join(doubtful)}", InputWarning, stacklevel=2)
 
