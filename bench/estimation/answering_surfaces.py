@@ -38,20 +38,20 @@ SEEDS = (1, 2, 3)
 SECONDS = 300.0
 
 
-def doublets(every: float) -> tuple[str, ...]:
-    """One on each surface in turn, as often as it fits."""
-    count = int((SECONDS - 10.0) / every)
+def doublets(every: float, seconds: float = SECONDS) -> tuple[str, ...]:
+    """One on each surface in turn, as often as it fits into a flight of so many s."""
+    count = int((seconds - 10.0) / every)
     return tuple(
         f"doublet:{surface}:amplitude={peak}:width=0.35:start={5.0 + i * every / 3.0}:every={every}:repeat={count}"
         for i, (surface, peak) in enumerate(PEAKS.items())
     )
 
 
-def multisines(share: float) -> tuple[str, ...]:
-    """On all surfaces at once, with a ``share`` of the usual peaks."""
+def multisines(share: float, seconds: float = SECONDS) -> tuple[str, ...]:
+    """On all surfaces at once, with a ``share`` of the usual peaks, as often as it fits into a flight of so many s."""
     peaks = ",".join(f"{share * peak:.3g}" for peak in PEAKS.values())
-    surfaces = ALL.split(":")[0]
-    return (f"multisine:{surfaces}:amplitude={peaks}:length=20:low=0.1:high=2:start=0.7:every=20:repeat=14",)
+    surfaces, count = ALL.split(":")[0], int((seconds - 10.0) / 20.0)
+    return (f"multisine:{surfaces}:amplitude={peaks}:length=20:low=0.1:high=2:start=0.7:every=20:repeat={count}",)
 
 
 FLIGHTS: Mapping[str, Setting] = {

@@ -16,8 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.estimation.answering_surfaces import judged
-from bench.estimation.convergence import ALL, PEAKS
+from bench.estimation.answering_surfaces import doublets, judged, multisines
 from bench.estimation.judging import exact, processes
 from bench.estimation.simulated_flights import Setting, fly
 from bench.pages import publish, table
@@ -32,22 +31,11 @@ SECONDS = 120.0
 Counts = tuple[int, int, int, int]
 
 
-def doublets(every: float) -> tuple[str, ...]:
-    """One on each surface in turn, as often as it fits."""
-    count = int((SECONDS - 5.0) / every)
-    return tuple(
-        f"doublet:{surface}:amplitude={peak}:width=0.35:start={5.0 + i * every / 3.0}:every={every}:repeat={count}"
-        for i, (surface, peak) in enumerate(PEAKS.items())
-    )
-
-
-def multisines() -> tuple[str, ...]:
-    """On all surfaces at once."""
-    peaks = ",".join(f"{peak:.3g}" for peak in PEAKS.values())
-    return (f"multisine:{ALL.split(':')[0]}:amplitude={peaks}:length=20:low=0.1:high=2:start=0.7:every=22:repeat=5",)
-
-
-MANOEUVRES = {"3-2-1-1s": (), "multisines": multisines(), "doublets every 20 s": doublets(20.0)}
+MANOEUVRES = {
+    "3-2-1-1s": (),
+    "multisines": multisines(1.0, SECONDS),
+    "doublets every 20 s": doublets(20.0, SECONDS),
+}
 
 
 def counted(stiffness: float, manoeuvre: str, seeds: list[int], flown: tuple[str, str]) -> Counts | None:

@@ -34,9 +34,9 @@ def find_packages() -> None:
 def leave_shared_memory() -> None:
     """Let Fast DDS send by UDP alone, unless the environment names other transports (FASTDDS_BUILTIN_TRANSPORTS).
 
-    Its shared memory does not stand a process that is killed: one that takes its place at once may never hear a
-    message, because a publisher that clears up what the first has left removes what the second has made (Fast DDS's
-    issues 5053 and 5469, request 4728).
+    With its shared memory, a process that takes the place of a killed one at once may never hear a message: a publisher
+    that clears up what the killed one has left removes what the new one has made (Fast DDS's issues 5053 and 5469,
+    pull request 4728).
     """
     os.environ.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
 

@@ -44,16 +44,19 @@ def test_nodes_leave_shared_memory_where_no_other_transports_are_named(named: st
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
-@pytest.mark.parametrize("profile", [True, False])
-def test_a_node_has_no_shared_memory_of_fast_dds(probe: Probe, profile: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Truth: the memory of its process, by the profile of this computer alone, and without a profile."""
+@pytest.mark.parametrize(
+    ("transports", "profile", "shared"), [(None, True, 0), (None, False, 0), ("DEFAULT", False, 1)]
+)
+def test_shared_memory_of_fast_dds_is_there_only_where_it_is_asked_for(
+    probe: Probe, transports: str | None, profile: bool, shared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Truth: the memory of its process. The library of its messages is loaded once its topics are there."""
     if not profile:
         monkeypatch.delenv("FASTRTPS_DEFAULT_PROFILES_FILE")
         monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
+    if transports:
+        monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", transports)
     with ended(start("identifier", "--ros-args", "-p", "aircraft:=cdrw")) as node:
-        if profile:
-            probe.await_identifier()
         maps = Path(f"/proc/{node.pid}/maps")
-        probe.until(lambda: "libfastrtps" in maps.read_text(encoding="utf-8"))
-        probe.spin(2.0)
-        assert "/dev/shm/fastrtps" not in maps.read_text(encoding="utf-8")
+        probe.until(lambda: "libsysid_msgs__rosidl_typesupport_fastrtps" in maps.read_text(encoding="utf-8"))
+        assert ("/dev/shm/fastrtps" in maps.read_text(encoding="utf-8")) == shared

@@ -171,8 +171,13 @@ def _part(flight: GapFlight, record: FlightRecord, rows: slice) -> GapFlight:
 
 def _surface_moves(aircraft: Aircraft, record: FlightRecord) -> bool:
     """Whether a control surface moves as much as a diagnosis needs."""
-    deflections = [record[name] for name in aircraft.control_symbols if record.measured(name)]
-    return any(np.ptp(np.nanpercentile(d, [0.5, 99.5])) >= THRESHOLDS.admission.least_travel for d in deflections)
+    deflections = np.column_stack([record[name] for name in aircraft.control_symbols])
+    return bool((travel(deflections) >= THRESHOLDS.admission.least_travel).any())
+
+
+def travel(deflections: Array) -> Array:
+    """Travel (...,) of controls (N, ...), rad, without single outliers; NaN where values are missing."""
+    return np.asarray(np.ptp(np.percentile(deflections, [0.5, 99.5], axis=0), axis=0))
 
 
 def _complete(aircraft: Aircraft, record: FlightRecord, source: str) -> FlightRecord:

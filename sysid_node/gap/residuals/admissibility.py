@@ -10,7 +10,7 @@ import numpy as np
 from sysid_node.errors import InputError
 from sysid_node.flight.live.mean_lift import LiftLimits, lift_agrees, likely_mistakes
 from sysid_node.flight.record import Array
-from sysid_node.gap.flightdata.gap_flight import GapFlight
+from sysid_node.gap.flightdata.gap_flight import GapFlight, travel
 from sysid_node.gap.residuals.residual_model import ResidualModel
 from sysid_node.gap.thresholds import THRESHOLDS, Admission
 
@@ -31,10 +31,10 @@ def require_distinct_flights(flights: Sequence[GapFlight], holdouts: Sequence[Ga
 def require_admissible(model: ResidualModel, limits: Admission = THRESHOLDS.admission) -> ResidualModel:
     """The model itself. Raises InputError where no surface moves, or where the lift is that of another aircraft."""
     commands = model.commands[:, :-1]
-    travel = np.ptp(np.percentile(commands, [0.5, 99.5], axis=0), axis=0)
-    if (travel < limits.least_travel).all():
+    moved = travel(commands)
+    if (moved < limits.least_travel).all():
         raise InputError(
-            f"{model.flight.source}: no control surface moves by more than {travel.max():.2g} rad; fly a manoeuvre "
+            f"{model.flight.source}: no control surface moves by more than {moved.max():.2g} rad; fly a manoeuvre "
             "(sysid excite designs one)"
         )
     lift, expected = model.series[:, 0].mean(), model.predicted_series(model.simulator.neutral())[:, 0].mean()

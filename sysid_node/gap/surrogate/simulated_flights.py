@@ -10,7 +10,7 @@ import numpy as np
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.errors import InputError
 from sysid_node.flight.record import Array, FlightRecord
-from sysid_node.gap.flightdata.gap_flight import GapFlight
+from sysid_node.gap.flightdata.gap_flight import GapFlight, travel
 
 #: Shortest simulated flight in all, s: every axis once, and as much again to check on.
 SHORTEST = 30.0
@@ -86,14 +86,8 @@ def _unmoved(aircraft: Aircraft, flights: Sequence[GapFlight]) -> list[str]:
     return [
         control.name
         for control in aircraft.controls.values()
-        if max(_travel(flight.record[control.symbol]) for flight in flights) < _LEAST_TRAVEL
+        if max(float(travel(flight.record[control.symbol])) for flight in flights) < _LEAST_TRAVEL
     ]
-
-
-def _travel(deflection: Array) -> float:
-    """Travel of a control (N,), rad, without single outliers."""
-    low, high = np.percentile(deflection, [0.5, 99.5])
-    return float(high - low)
 
 
 def _part(flight: GapFlight, begin: float, end: float) -> GapFlight:

@@ -4,9 +4,7 @@ import os
 
 import pytest
 
-from sysid_node.cli.live.ros_domain import LOCAL, PROFILE, own_domain
-
-RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+from sysid_node.cli.live.ros_domain import LOCAL, PROFILE, RANGE, own_domain
 
 
 @pytest.mark.parametrize(
@@ -15,19 +13,22 @@ RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
         ({}, True),
         ({"RMW_IMPLEMENTATION": "rmw_fastrtps_dynamic_cpp"}, True),
         ({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}, False),
+        ({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp", PROFILE: f"/share/{LOCAL}"}, False),
         ({PROFILE: "/my/profile.xml"}, False),
+        ({PROFILE: f"/share/{LOCAL}"}, True),
     ],
 )
 def test_only_this_computer(before: dict[str, str], by_profile: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "environ", dict(before))
     own_domain()
-    assert os.environ.get(PROFILE, "").endswith(LOCAL) == by_profile
     assert os.environ.get(RANGE) == (None if by_profile else "LOCALHOST")
+    assert not by_profile or os.environ[PROFILE].endswith(LOCAL)
     assert 1 <= int(os.environ["ROS_DOMAIN_ID"]) <= 100
 
 
 def test_what_is_named_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    named = {"ROS_DOMAIN_ID": "7", PROFILE: "/my/profile.xml", RANGE: "SUBNET"}
+    """Whoever lets other computers hear the nodes must not be overruled by the profile."""
+    named = {"ROS_DOMAIN_ID": "7", RANGE: "SUBNET"}
     monkeypatch.setattr(os, "environ", dict(named))
     own_domain()
     assert os.environ == named
