@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.estimation.attitude_loops import AttitudeLoops
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.dynamics.atmosphere import air_density
@@ -76,7 +77,8 @@ class Setting:
     name: str
     turbulence: str = "none"
     autopilot: bool = True
-    stiffness: float = 1.0  # times the gains of the simulator's own autopilot
+    stiffness: float = 1.0  # times the gains of the autopilot
+    loops: AttitudeLoops | None = None  # of the autopilot; none: the simulator's own
     seconds: float = 60.0
     manoeuvre: Sequence[str] = ()  # none: multistep, or without the autopilot doublets
     effects: Effects = field(default_factory=dict)
@@ -112,7 +114,7 @@ def fly(aircraft: str, setting: Setting, seeds: Sequence[int]) -> Batch:
     flown = setting.manoeuvre or usual(setting.seconds)
     plan = parse_manoeuvre(flown, simulator.aircraft, RATE, setting.seconds)
     commands = jnp.asarray(trim.command + np.column_stack([plan.surfaces(), np.zeros(plan.time.size)]))
-    pilot = _stiffer(autopilot_for(simulator, trim), setting.stiffness) if setting.autopilot else None
+    pilot = _pilot(simulator, trim, setting) if setting.autopilot else None
 
     def one(gusts: Any, noise: Any) -> Any:
         inputs = simulator.inputs(commands, turbulence=gusts, noise=noise)
@@ -126,9 +128,12 @@ def fly(aircraft: str, setting: Setting, seeds: Sequence[int]) -> Batch:
     return Batch(plan.time, _samples(np.asarray(flights.outputs), np.asarray(flights.surfaces), flights.states))
 
 
-def _stiffer(pilot: Autopilot, factor: float) -> Autopilot:
-    """The autopilot with so many times its gains; its authority stays."""
-    return pilot._replace(gains=factor * pilot.gains, integral=factor * pilot.integral)
+def _pilot(simulator: Simulator, trim: Trim, setting: Setting) -> Autopilot:
+    """The autopilot with the setting's loops and so many times their gains; its authority stays."""
+    pilot = autopilot_for(simulator, trim)
+    if setting.loops is not None:
+        pilot = setting.loops.flown_by(pilot, simulator.commands)
+    return pilot._replace(gains=setting.stiffness * pilot.gains, integral=setting.stiffness * pilot.integral)
 
 
 def _flown(

@@ -1,9 +1,9 @@
-"""Whether intervals hold where an autopilot answers gusts with loops stiffer than those of the simulator's own.
+"""Whether intervals hold where an autopilot answers gusts as PX4 and ArduPilot do, or with stiffer loops.
 
     python -m bench.estimation.stiff_autopilots --page docs/results/intervals.md
 
-Flights of two minutes in light and moderate turbulence, with manoeuvres on top of the autopilot's commands. The file is
-exact and the surfaces are measured, so that nothing but the loops may move an estimate. Of all aircraft, airs and seeds
+Flights of two minutes in light and moderate turbulence, with manoeuvres on top of the autopilot's commands: the
+simulator's own with up to eight times its gains, and one with the loops of others (``attitude_loops``). The file is exact and the surfaces are measured, so that nothing but the loops may move an estimate. Of all aircraft, airs and seeds
 of a row: how many derivatives are valid, how many of their 95 % intervals hold, and how many estimates are far off.
 """
 
@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.estimation.answering_surfaces import doublets, judged, multisines
+from bench.estimation.attitude_loops import ARDUPILOT, PX4, TIGHT, AttitudeLoops
 from bench.estimation.judging import exact, processes
 from bench.estimation.simulated_flights import Setting, fly
 from bench.pages import publish, table
@@ -25,11 +26,16 @@ from sysid_node.errors import InputError
 from sysid_node.online.replay import run_to_end
 from sysid_node.online.settings import OnlineSettings
 
-AIRCRAFT, AIRS, STIFFNESSES = ("cdrw", "cdfp", "kestrel"), ("light", "moderate"), (1.0, 2.0, 4.0, 8.0)
+AIRCRAFT, AIRS = ("cdrw", "cdfp", "kestrel"), ("light", "moderate")
 SECONDS = 120.0
 
 Counts = tuple[int, int, int, int]
+Loops = tuple[AttitudeLoops | None, float]  # none: the simulator's own; times their gains
 
+AUTOPILOTS: dict[str, Loops] = {
+    **{f"own gains x {factor:g}": (None, factor) for factor in (1.0, 2.0, 4.0, 8.0)},
+    **{loops.name: (loops, 1.0) for loops in (PX4, ARDUPILOT, TIGHT)},
+}
 
 MANOEUVRES = {
     "3-2-1-1s": (),
@@ -38,11 +44,12 @@ MANOEUVRES = {
 }
 
 
-def counted(stiffness: float, manoeuvre: str, seeds: list[int], flown: tuple[str, str]) -> Counts | None:
+def counted(autopilot: str, manoeuvre: str, seeds: list[int], flown: tuple[str, str]) -> Counts | None:
     """Derivatives, those valid, those of these that hold, and those far off, of some flights; None: they diverge."""
     aircraft, air = flown
     known = exact(load_aircraft(aircraft))
-    setting = Setting("", air, stiffness=stiffness, seconds=SECONDS, manoeuvre=MANOEUVRES[manoeuvre])
+    loops, factor = AUTOPILOTS[autopilot]
+    setting = Setting("", air, stiffness=factor, loops=loops, seconds=SECONDS, manoeuvre=MANOEUVRES[manoeuvre])
     try:
         batch = fly(aircraft, setting, seeds)
     except InputError:
@@ -52,11 +59,11 @@ def counted(stiffness: float, manoeuvre: str, seeds: list[int], flown: tuple[str
     return count, valid, hold, far
 
 
-def row(manoeuvre: str, stiffness: float, found: list[Counts]) -> list[str]:
+def row(manoeuvre: str, autopilot: str, found: list[Counts]) -> list[str]:
     """Of flights that did not diverge."""
     count, valid, hold, far = np.sum(found, axis=0)
     shares = (valid / count, hold / max(valid, 1), far / max(valid, 1))
-    return [manoeuvre, f"{stiffness:g}", str(len(found)), *(f"{100.0 * share:.1f} %" for share in shares)]
+    return [manoeuvre, autopilot, str(len(found)), *(f"{100.0 * share:.1f} %" for share in shares)]
 
 
 def main() -> None:
@@ -68,12 +75,12 @@ def main() -> None:
     args = parser.parse_args()
     seeds, rows = list(range(args.first, args.first + args.flights)), []
     with processes() as pool:
-        for manoeuvre, stiffness in product(MANOEUVRES, STIFFNESSES):
-            work = partial(counted, stiffness, manoeuvre, seeds)
+        for manoeuvre, autopilot in product(MANOEUVRES, AUTOPILOTS):
+            work = partial(counted, autopilot, manoeuvre, seeds)
             found = [counts for counts in pool.map(work, product(AIRCRAFT, AIRS)) if counts is not None]
-            rows.append(row(manoeuvre, stiffness, found))
+            rows.append(row(manoeuvre, autopilot, found))
             print(*rows[-1], flush=True)
-    heads = ("manoeuvres", "times the gains", "aircraft and airs", "valid", "hold", "> 4 s.e.")
+    heads = ("manoeuvres", "autopilot", "aircraft and airs", "valid", "hold", "> 4 s.e.")
     publish("bench/estimation/stiff_autopilots.py", table(heads, rows), args.page)
 
 

@@ -28,7 +28,7 @@ from sysid_node.sim.stations import command
 Array = NDArray[np.float64]
 
 #: Bandwidth of the attitude loops, rad/s; of the integral in it, 1/s; of the airspeed loop, 1/s.
-_BANDWIDTH, _INTEGRAL, _SPEED = 1.5, 0.3, 0.4
+BANDWIDTH, _INTEGRAL, _SPEED = 1.5, 0.3, 0.4
 
 #: Share of a surface's travel that feedback may use.
 _SHARE = 0.5
@@ -37,7 +37,7 @@ _SHARE = 0.5
 _LONGEST_DELAY = 0.5
 
 #: Outputs that are fed back, in the order of the gain matrix's columns.
-_SEEN = ("p", "q", "r", "phi", "theta", "V")
+SEEN = ("p", "q", "r", "phi", "theta", "V")
 
 
 class Autopilot(NamedTuple):
@@ -62,12 +62,12 @@ class _AutopilotState(NamedTuple):
 def autopilot_for(simulator: Simulator, trim: Trim) -> Autopilot:
     """The autopilot that holds this trim; a loop whose surface the aircraft lacks stays open."""
     aircraft, commands = simulator.aircraft, simulator.commands
-    gains, integral = np.zeros((len(commands), len(_SEEN))), np.zeros((len(commands), len(_SEEN)))
+    gains, integral = np.zeros((len(commands), len(SEEN))), np.zeros((len(commands), len(SEEN)))
     for control, entries in _loops(aircraft).items():
         for seen, gain in entries.items():
-            gains[commands.index(control), _SEEN.index(seen)] = gain
+            gains[commands.index(control), SEEN.index(seen)] = gain
             if seen in ("phi", "theta"):
-                integral[commands.index(control), _SEEN.index(seen)] = _INTEGRAL * gain
+                integral[commands.index(control), SEEN.index(seen)] = _INTEGRAL * gain
     limits = np.minimum(np.asarray(simulator.model.limits), 0.5)
     thrust = min(float(simulator.model.max_thrust), 10.0 * 9.8 * aircraft.mass) if aircraft.throttle else 0.0
     attitude = euler_angles(body_state(jnp.asarray(trim.initial)).attitude, jnp)
@@ -124,7 +124,7 @@ def _fly_held(
     samples: Scalar | int,
 ) -> SimulatedFlight:
     chain = Chain.of(layout, model, theta, step, -initial[2])
-    columns = jnp.array([OUTPUTS.index(name) for name in _SEEN])
+    columns = jnp.array([OUTPUTS.index(name) for name in SEEN])
 
     def pilot(state: _AutopilotState, outputs: Scalar, planned: Scalar) -> tuple[Scalar, Scalar, _AutopilotState]:
         error = outputs[columns] - autopilot.hold
@@ -139,7 +139,7 @@ def _fly_held(
         integral = state.integral + jnp.where(saturated, 0.0, error * step)
         return commanded, arriving, _AutopilotState(integral, state.sample + 1, past)
 
-    start = _AutopilotState(jnp.zeros(len(_SEEN)), jnp.ones((), int), jnp.tile(inputs.commands[0], (history, 1)))
+    start = _AutopilotState(jnp.zeros(len(SEEN)), jnp.ones((), int), jnp.tile(inputs.commands[0], (history, 1)))
     return fly(chain, initial, inputs, pilot, start, samples)
 
 
@@ -148,9 +148,9 @@ def _loops(aircraft: Aircraft) -> dict[str, dict[str, float]]:
     loops: dict[str, dict[str, float]] = {}
     pitch, roll, yaw = _pitch_response(aircraft), _roll_response(aircraft), _value(aircraft, "Cn_dr")
     if pitch:
-        loops["elevator"] = {"theta": -_BANDWIDTH / pitch, "q": -0.2 * _BANDWIDTH / pitch}
+        loops["elevator"] = {"theta": -BANDWIDTH / pitch, "q": -0.2 * BANDWIDTH / pitch}
     if roll:
-        loops["aileron"] = {"phi": -_BANDWIDTH / roll, "p": -0.05 * _BANDWIDTH / roll}
+        loops["aileron"] = {"phi": -BANDWIDTH / roll, "p": -0.05 * BANDWIDTH / roll}
     if yaw:
         span, speed = aircraft.geometry.b, aircraft.reference.airspeed
         damping = abs(_value(aircraft, "Cn_r")) * span / (2.0 * speed)  # doubles the natural damping
