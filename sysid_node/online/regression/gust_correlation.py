@@ -35,7 +35,7 @@ from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
-ALLOWED = 0.05  # correlation between instruments and gusts, where surfaces are moved on purpose
+ALLOWED = 0.07  # correlation between instruments and gusts, where surfaces are moved on purpose
 ANSWERED = 0.3  # that correlation where the gusts' moments have the energy of the moments by deflections
 MOMENTS = ("Cl", "Cm", "Cn")
 RATES = ("p", "q", "r")
