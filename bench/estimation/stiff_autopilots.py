@@ -3,8 +3,9 @@
     python -m bench.estimation.stiff_autopilots --page docs/results/intervals.md
 
 Flights of two minutes in light and moderate turbulence, with manoeuvres on top of the autopilot's commands: the
-simulator's own with up to eight times its gains, and one with the loops of others (``attitude_loops``). The file is exact and the surfaces are measured, so that nothing but the loops may move an estimate. Of all aircraft, airs and seeds
-of a row: how many derivatives are valid, how many of their 95 % intervals hold, and how many estimates are far off.
+simulator's own with up to eight times its gains, and those of others (``attitude_loops``). The file is exact and the
+surfaces are measured, so that nothing but the loops may move an estimate. Of all aircraft, airs and seeds of a row: how
+many derivatives are valid, how many of their 95 % intervals hold, and how many estimates are far off.
 """
 
 from __future__ import annotations
