@@ -90,10 +90,13 @@ def only_answered(instrumented: NormalEquations, gram: Array, gusts: Array) -> N
     return np.asarray(found & (share_by_axis(structure.coefficients, gusts) > NOTABLE))
 
 
-def by_deflections(equations: NormalEquations, theta: Array, normal: Array, energy: Array) -> Array:
+def by_deflections(
+    equations: NormalEquations, theta: Array, normal: Array, energy: Array, answered: float = ANSWERED
+) -> Array:
     """(..., C) correlation between instruments and gusts by the ``energy`` (..., C) of the gusts' moments.
 
-    ``theta`` (..., P, C): derivatives; ``normal`` (..., P, P): Gram matrix of the regressors.
+    ``theta`` (..., P, C): derivatives; ``normal`` (..., P, P): Gram matrix of the regressors; ``answered``: the
+    correlation where the gusts' moments have the energy of the moments by deflections.
     """
     structure = equations.structure
     of_controls = theta * equations.deflected[:, None]
@@ -102,7 +105,7 @@ def by_deflections(equations: NormalEquations, theta: Array, normal: Array, ener
     ratio = np.where(told, energy / np.where(told, moved, 1.0), 0.0)
     alike = structure.block[:, None] == structure.block
     of_block = np.where(alike, ratio[..., None, :], 0.0).max(axis=-1)
-    return np.asarray(np.minimum(ANSWERED * np.sqrt(of_block), 1.0))
+    return np.asarray(np.minimum(answered * np.sqrt(of_block), 1.0))
 
 
 def sensed(

@@ -11,10 +11,9 @@ from scipy.stats import f as fisher
 
 from sysid_node.online import estimator
 from sysid_node.online.changes.detection import ChangeTests
-from sysid_node.online.changes.score_test import ReferenceEstimates, ScoreTest, disagreement, score_test
+from sysid_node.online.changes.score_test import ANSWERED, ReferenceEstimates, ScoreTest, disagreement, score_test
 from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression import normal_equations, regressor_noise
-from sysid_node.online.regression.gust_correlation import ANSWERED
 from sysid_node.online.regression.information import BANDS, spectrum
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
 from sysid_node.online.settings import METHODS, OnlineSettings
