@@ -17,13 +17,13 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.estimation.attitude_loops import AttitudeLoops
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.aircraft.model import Aircraft
 from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.online.types import SAMPLE_COLUMNS
 from sysid_node.sim import Simulator, trim_flight
+from sysid_node.sim.flying.attitude_loops import AttitudeLoops
 from sysid_node.sim.flying.autopilot import Autopilot, autopilot_for, fly_held
 from sysid_node.sim.flying.rollout import RolloutInputs, SimulatedFlight
 from sysid_node.sim.flying.trim import Trim

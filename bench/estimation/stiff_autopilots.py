@@ -3,9 +3,9 @@
     python -m bench.estimation.stiff_autopilots --page docs/results/intervals.md
 
 Flights of two minutes in light and moderate turbulence, with manoeuvres on top of the autopilot's commands: the
-simulator's own with up to eight times its gains, and those of others (``attitude_loops``). The file is exact and the
-surfaces are measured, so that nothing but the loops may move an estimate. Of all aircraft, airs and seeds of a row: how
-many derivatives are valid, how many of their 95 % intervals hold, and how many estimates are far off.
+simulator's own with up to eight times its gains, and those of others. The file is exact and the surfaces are measured,
+so that nothing but the loops may move an estimate. Of all aircraft, airs and seeds of a row: how many derivatives are
+valid, how many of their 95 % intervals hold, and how many estimates are far off.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 
 from bench.estimation.answering_surfaces import doublets, judged, multisines
-from bench.estimation.attitude_loops import ARDUPILOT, PX4, TIGHT, AttitudeLoops
 from bench.estimation.judging import exact, processes
 from bench.estimation.simulated_flights import Setting, fly
 from bench.pages import publish, table
@@ -26,12 +25,16 @@ from sysid_node.aircraft.load import load_aircraft
 from sysid_node.errors import InputError
 from sysid_node.online.replay import run_to_end
 from sysid_node.online.settings import OnlineSettings
+from sysid_node.sim.flying.attitude_loops import ARDUPILOT, PX4, AttitudeLoops, RateLoop
 
 AIRCRAFT, AIRS = ("cdrw", "cdfp", "kestrel"), ("light", "moderate")
 SECONDS = 120.0
 
 Counts = tuple[int, int, int, int]
 Loops = tuple[AttitudeLoops | None, float]  # none: the simulator's own; times their gains
+
+#: With the least time constant that PX4 and ArduPilot recommend, and a rate that is answered as much as a demand.
+TIGHT = AttitudeLoops("tight", 0.4, RateLoop(1.0, 0.43), RateLoop(1.0, 0.39))
 
 AUTOPILOTS: dict[str, Loops] = {
     **{f"own gains x {factor:g}": (None, factor) for factor in (1.0, 2.0, 4.0, 8.0)},

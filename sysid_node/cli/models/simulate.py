@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 #: Rate of the integration, Hz; raised to the IMU's where that is higher. Commands that are held jump within a step, so
 #: that their time is right to half of it.
 _RATE, _HELD_RATE = 200.0, 1000.0
+#: Attitude loops of the autopilot: the simulator's own, or those of others with their default gains.
+LOOPS = ("own", "px4", "ardupilot")
 #: Height above the ground (m) where none is given, for turbulence.
 _HEIGHT = 100.0
 #: Multiple of the file's noise where none is given.
@@ -75,6 +77,9 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     held = parser.add_mutually_exclusive_group().add_argument
     held("--open-loop", dest="autopilot", action="store_false", help="without the autopilot")
     held("--autopilot", action="store_true", default=True, help="hold attitude and airspeed (default)")
+    add(
+        "--loops", choices=LOOPS, default=LOOPS[0], help="the autopilot's in roll and pitch (default: own, softer ones)"
+    )
     add("--noise", type=float, default=_NOISE, help="of the aircraft file's sensor noise (default: 1)")
     add("--rate", type=float, default=200.0, help="of the IMU, Hz (default: 200)")
     add("--air-data-rate", type=float, default=100.0, help="Hz (default: 100)")
@@ -101,6 +106,7 @@ def run(args: argparse.Namespace) -> None:
 def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStream]]:
     """The flight and its messages, with those of ``_beside``."""
     from sysid_node.excite.manoeuvre import check_thrust  # noqa: PLC0415  # JAX takes its time
+    from sysid_node.sim.flying import attitude_loops  # noqa: PLC0415
     from sysid_node.sim.flying.recording import FlightSampler  # noqa: PLC0415
     from sysid_node.sim.flying.sortie import SortieConditions, fly_sortie  # noqa: PLC0415
     from sysid_node.sim.simulator import Simulator  # noqa: PLC0415
@@ -125,6 +131,7 @@ def _fly(args: argparse.Namespace) -> tuple[Sortie, Streams, dict[str, JointStre
         args.seed,
         rotary_gusts=not args.linear_gusts,
         command_rate=command_rate,
+        loops=attitude_loops.LOOPS.get(args.loops),
     )
     _check_memory(args.duration, rate)
     plan = _plan(args, simulator, command_rate or rate)
@@ -155,6 +162,8 @@ def _check_options(args: argparse.Namespace, aircraft: Aircraft) -> None:
     ):
         if given and key in stated.get(effect, {}):
             raise InputError(f"{option}: --effect {effect} states {key}, too; give one of them")
+    if args.loops != LOOPS[0] and not args.autopilot:
+        raise InputError(f"--loops {args.loops}: --open-loop flies without the autopilot; give one of them")
     if args.turbulence != "none" or "turbulence" in stated or "turbulence" in aircraft.effects:
         return
     said = "--linear-gusts" if args.linear_gusts else f"--height {args.height:g}" if args.height != _HEIGHT else ""
@@ -266,6 +275,8 @@ def _command(args: argparse.Namespace) -> str:
         elif isinstance(value, bool):  # --force and --quiet are not part of what was flown
             words += ["--open-loop"] if name == "autopilot" and not value else []
             words += ["--linear-gusts"] if name == "linear_gusts" and value else []
+        elif name == "loops":
+            words += [option, value] if value != LOOPS[0] else []
         elif value is not None and name != "command":
             words += [option, str(value)]
     return shlex.join(words)

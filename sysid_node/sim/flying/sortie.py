@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.errors import InputError
+from sysid_node.sim.flying.attitude_loops import AttitudeLoops
 from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
 from sysid_node.sim.flying.rollout import RolloutInputs, SimulatedFlight
 from sysid_node.sim.flying.trim import Trim, trim_flight
@@ -35,6 +36,7 @@ class SortieConditions:
     seed: int = 0
     rotary_gusts: bool = True  # whether the turbulence has angular velocities, too
     command_rate: float | None = None  # Hz, of commands that are held; None: the simulator's, linear between samples
+    loops: AttitudeLoops | None = None  # of the autopilot; None: the simulator's own
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,10 @@ def fly_sortie(simulator: Simulator, deflections: Array, conditions: SortieCondi
     _check_travel(simulator, commands)
     inputs = _inputs(simulator, trim, commands, conditions)
     if conditions.autopilot:
-        flight = fly_held(simulator, theta, trim, inputs, autopilot_for(simulator, trim), given)
+        pilot = autopilot_for(simulator, trim)
+        if conditions.loops is not None:
+            pilot = conditions.loops.flown_by(pilot, simulator.commands)
+        flight = fly_held(simulator, theta, trim, inputs, pilot, given)
     else:
         flight = simulator.rollout(theta, trim.initial, inputs)
     return Sortie(simulator, conditions, effects, theta, trim, inputs, simulator.check(flight))

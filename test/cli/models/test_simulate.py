@@ -9,10 +9,12 @@ import pytest
 
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.cli.main import main
+from sysid_node.cli.models import simulate
 from sysid_node.flight.bag.reader import read_streams
 from sysid_node.flight.logs.opening import load_flight_record
 from sysid_node.flight.topics import topic_names
 from sysid_node.flight.truth import read_truth
+from sysid_node.sim.flying import attitude_loops
 
 ROOT = Path(__file__).resolve().parents[3]
 BAGS = ROOT / "bags"
@@ -200,6 +202,40 @@ def test_with_and_without_the_autopilot_is_a_contradiction(tmp_path, capsys):
         main(["simulate", "--aircraft", "cdrw", "--open-loop", "--autopilot", "--out", str(tmp_path / "bag")])
     assert stop.value.code == 2
     assert "--autopilot: not allowed with argument --open-loop" in capsys.readouterr().err
+
+
+def test_loops_are_those_of_the_autopilots_that_are_known_and_need_one(tmp_path, capsys):
+    assert ("own", *attitude_loops.LOOPS) == simulate.LOOPS
+    words = ["simulate", "--aircraft", "cdrw", "--loops", "px4", "--open-loop", "--out", str(tmp_path / "bag")]
+    assert main(words) == 2
+    assert "--loops px4: --open-loop flies without the autopilot" in capsys.readouterr().err
+    assert not (tmp_path / "bag").exists()
+
+
+@pytest.mark.slow
+def test_other_loops_answer_gusts_with_more_aileron(tmp_path):
+    """By the same gusts; the command that repeats the flight names the loops."""
+    moved = {}
+    for loops in simulate.LOOPS:
+        options = [
+            "--turbulence",
+            "light",
+            "--seed",
+            "5",
+            "--duration",
+            "8",
+            "--rate",
+            "100",
+            "--loops",
+            loops,
+            "--quiet",
+        ]
+        bag = fly(tmp_path, loops, *options)
+        moved[loops] = load_flight_record(bag, load_aircraft("cdrw"))["da"].std()
+        command = json.loads((tmp_path / f"{loops}.truth.json").read_text())["command"]
+        assert ("--loops" in command) == (loops != "own")
+    assert moved["px4"] > moved["own"]
+    assert moved["ardupilot"] > moved["own"]
 
 
 @pytest.mark.slow

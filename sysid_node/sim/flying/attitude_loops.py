@@ -1,4 +1,4 @@
-"""The attitude loops of PX4 and ArduPilot, with their default gains, for the simulator's autopilot.
+"""The attitude loops of PX4 and ArduPilot, with their default gains, in place of those of the simulator's autopilot.
 
 Both demand a rate that takes away the error of the attitude within a time constant T, and deflect a surface by
 
@@ -34,9 +34,14 @@ class AttitudeLoops:
     pitch: RateLoop
 
     def flown_by(self, pilot: Autopilot, commands: tuple[str, ...]) -> Autopilot:
-        """The simulator's own ``pilot`` with these loops in roll and pitch; ``commands``: of which its gains are."""
+        """The simulator's own ``pilot`` with these loops in roll and pitch; ``commands``: of which its gains are.
+
+        A loop whose surface the aircraft lacks stays open.
+        """
         gains, integral = pilot.gains, pilot.integral
         for control, rate, angle, loop in (("aileron", "p", "phi", self.roll), ("elevator", "q", "theta", self.pitch)):
+            if control not in commands:
+                continue
             row, turned, held = commands.index(control), SEEN.index(rate), SEEN.index(angle)
             feedforward = pilot.gains[row, held] / BANDWIDTH
             # the integral of a rate is the angle
@@ -53,5 +58,5 @@ PX4 = AttitudeLoops("PX4", 0.4, RateLoop(0.1, 0.02), RateLoop(0.16, 0.04))
 #: ``AP_RollController.cpp`` and ``AP_PitchController.cpp``, written as gains of rates: TCONST 0.5 s; feedforward 0.345,
 #: P 0.08, I 0.15 in roll; 0.385, 0.04, 0.15 in pitch.
 ARDUPILOT = AttitudeLoops("ArduPilot", 0.5, RateLoop(0.23, 0.43), RateLoop(0.1, 0.39))
-#: With the least time constant that both recommend, and a rate that is answered as much as a demand.
-TIGHT = AttitudeLoops("tight", 0.4, RateLoop(1.0, 0.43), RateLoop(1.0, 0.39))
+#: By the name of an autopilot.
+LOOPS = {"px4": PX4, "ardupilot": ARDUPILOT}

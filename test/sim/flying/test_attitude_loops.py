@@ -4,9 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from bench.estimation.attitude_loops import ARDUPILOT, PX4, AttitudeLoops
 from sysid_node.aircraft.load import load_aircraft
 from sysid_node.sim import Simulator, trim_flight
+from sysid_node.sim.flying.attitude_loops import ARDUPILOT, PX4, AttitudeLoops
 from sysid_node.sim.flying.autopilot import SEEN, autopilot_for
 
 RATE, ERROR, HELD = 0.3, 0.1, -0.2  # rad/s, rad, rad s
