@@ -43,9 +43,9 @@ from sysid_node.online.systematic.corrected_lines import LineCorrection
 
 Array = NDArray[np.float64]
 
-#: ``gust_correlation.ANSWERED`` between a stretch and what was learned. It is half as large as where estimates are
-#: compared with the truth: the same loops answered the gusts in both, so that much of the bias is the same.
-ANSWERED = 0.15
+#: Share of the correlation between instruments and gusts that is not the same in a stretch and where was learned from:
+#: the same loops answered the gusts in both, so that much of the bias is common to both.
+UNSHARED = 0.5
 LEAST = 0.1  # share of a stretch's energy that at least counts as the noise's, however many unknowns it has
 RIDGE = 1e-9  # share by which what did not move is set apart
 #: Share of the systematic errors by which manoeuvres may differ: imperfections are corrected to first order, and their
@@ -149,7 +149,7 @@ def score_test(
         usual = more * known.density
         gusts = gust_correlation.share_of_gusts(usual, reference.sensed)
         answered = gust_correlation.by_deflections(
-            equations, reference.solution.theta, normal, gusts * usual * energy, ANSWERED
+            equations, reference.solution.theta, normal, gusts * usual * energy, UNSHARED * gust_correlation.ANSWERED
         )
         more = more * (1.0 + answered**2 * gusts * energy / density_per_gram)
     noise *= (density_per_gram * more)[..., None, None]

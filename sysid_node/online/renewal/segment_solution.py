@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sysid_node.online.changes.score_test import ReferenceEstimates
+from sysid_node.online.changes.score_test import UNSHARED, ReferenceEstimates
 from sysid_node.online.regression import (
     actuator_lag_test,
     least_squares,
@@ -138,9 +138,8 @@ def _reference(
     equations, now = state.equations, state.transform.last
     noise = None if found.noise is None else regressor_noise.noise_score(equations, solution, found.noise)
     model = state.controls.line_model
-    return ReferenceEstimates(
-        now, equations, solution, spread, model, noise, inflation=found.inflation, sensed=found.sensed
-    )
+    inflation = 1.0 + UNSHARED**2 * (found.inflation - 1.0)
+    return ReferenceEstimates(now, equations, solution, spread, model, noise, inflation=inflation, sensed=found.sensed)
 
 
 def _corrected_signals(

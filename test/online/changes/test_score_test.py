@@ -11,9 +11,10 @@ from scipy.stats import f as fisher
 
 from sysid_node.online import estimator
 from sysid_node.online.changes.detection import ChangeTests
-from sysid_node.online.changes.score_test import ANSWERED, ReferenceEstimates, ScoreTest, disagreement, score_test
+from sysid_node.online.changes.score_test import UNSHARED, ReferenceEstimates, ScoreTest, disagreement, score_test
 from sysid_node.online.frequency.regression_signals import SignalLayout
 from sysid_node.online.regression import normal_equations, regressor_noise
+from sysid_node.online.regression.gust_correlation import ANSWERED
 from sysid_node.online.regression.information import BANDS, spectrum
 from sysid_node.online.regression.least_squares import Solution, Uncertainty
 from sysid_node.online.settings import METHODS, OnlineSettings
@@ -146,8 +147,8 @@ def test_a_stretch_in_which_surfaces_only_answer_gusts_contradicts_less() -> Non
     gusts = float(before.unexplained[moment]) * DENSITY * energy
     assert before.unexplained[moment] > 1.0  # rougher than usual
     ratio = gusts / (0.6**2 * float(np.square(lines[:, LAYOUT.column("de")]).sum()))
-    factor = 1.0 + ANSWERED**2 * ratio * energy * 0.04 / 0.5
-    assert ANSWERED**2 * ratio < 1.0
+    factor = 1.0 + (UNSHARED * ANSWERED) ** 2 * ratio * energy * 0.04 / 0.5
+    assert (UNSHARED * ANSWERED) ** 2 * ratio < 1.0
     assert before.statistic[moment] / after.statistic[moment] == pytest.approx(factor, rel=1e-6)
     assert after.statistic[lift] == pytest.approx(before.statistic[lift])
     sensed = replace(exact, sensed=np.full(C, 1e6))  # what the sensors' noise explains is no gust
