@@ -3,8 +3,8 @@
     python -m bench.gap.autopilots LEDGER [--page docs/results/gap_effects.md]
 
 Flights as ``sysid simulate`` makes them, in light and moderate turbulence, of an aircraft that is as its file says, and
-of one whose servos follow with a lag of 0.09 s. The same gusts are flown with the simulator's own autopilot and with
-the loops of PX4 and ArduPilot. Finished cases are kept in LEDGER, so that the command goes on where it stopped.
+of one whose servos follow with a lag of 0.09 s. Each aircraft flies in gusts of its own, and in the same ones with the
+simulator's own autopilot and with the loops of PX4 and ArduPilot. Finished cases are kept in LEDGER, so that the command goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from sysid_node.api.gap_diagnosis import diagnose
 
 AIRCRAFT, LOOPS, AIRS = ("cdrw", "cdfp", "kestrel"), ("own", "px4", "ardupilot"), ("light", "moderate")
 LAG, TIME = "actuator_lag", 0.09  # s
-#: Seeds of the gusts, with nothing withheld and with the lag.
-SEEDS = {"nothing": 71, LAG: 72}
+#: Seeds of the first aircraft's gusts, with nothing withheld and with the lag, and how far those of the next are off.
+SEEDS, NEXT = {"nothing": 71, LAG: 72}, 10
 NAMED = 0.5  # probability from which on a cause counts as named
 
 
@@ -44,7 +44,8 @@ def told(case: Case, folder: Path) -> dict[str, Any]:
     """What is needed of the diagnosis."""
     words = ["--manoeuvre", "3211:repeat=3", "--turbulence", case.air, "--loops", case.loops]
     words += ["--effect", f"{LAG}:time_constant={TIME}"] if case.withheld == LAG else []
-    bag = flown(folder / "_".join(asdict(case).values()), SEEDS[case.withheld], words, case.aircraft)
+    seed = SEEDS[case.withheld] + NEXT * AIRCRAFT.index(case.aircraft)
+    bag = flown(folder / "_".join(asdict(case).values()), seed, words, case.aircraft)
     found = diagnose(load(bag, case.aircraft)).document
     causes = [{key: cause[key] for key in ("effect", "parameters", "probability")} for cause in found["causes"]]
     return {**asdict(case), "verdict": found["verdict"], "causes": causes}
