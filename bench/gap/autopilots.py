@@ -4,7 +4,8 @@
 
 Flights as ``sysid simulate`` makes them, in light and moderate turbulence, of an aircraft that is as its file says, and
 of one whose servos follow with a lag of 0.09 s. Each aircraft flies in gusts of its own, and in the same ones with the
-simulator's own autopilot and with the loops of PX4 and ArduPilot. Finished cases are kept in LEDGER, so that the command goes on where it stopped.
+simulator's own autopilot and with the loops of PX4 and ArduPilot. Finished cases are kept in LEDGER, so that the
+command goes on where it stopped.
 """
 
 from __future__ import annotations
