@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sysid_node.online import status
 from sysid_node.online.alignment import flow_angle_filter
 from sysid_node.online.estimates import roll_mode_exchange
-from sysid_node.online.estimates.current_solution import CurrentSolution
+from sysid_node.online.estimates.current_solution import CurrentSolution, slope_variances
 from sysid_node.online.regression import damping, least_squares, normal_equations
 from sysid_node.online.regression.gust_correlation import MOMENTS
 from sysid_node.online.regression.least_squares import student_95
@@ -76,27 +76,47 @@ def _validity_basis(state: EstimatorState, latest: SegmentSolution) -> ValidityB
         systematic_arms=NORMAL_95**2 * systematic,
         floor=np.maximum(BURIED * latest.total.bias.take(equations.entries.energy), least_squares.TINY),
         fits=np.stack([np.zeros_like(stds), stds, freedom, np.full_like(stds, samples)], axis=1),
-        servos=_of_servos(state, objections, swapped),
+        servos=_of_servos(state, latest, objections, swapped),
     )
 
 
-def _of_servos(state: EstimatorState, objections: Codes, swapped: bool) -> Codes:
+def _of_servos(state: EstimatorState, latest: SegmentSolution, objections: Codes, swapped: bool) -> Codes:
     """(m,) the ``objections`` (D,) to the derivatives of a control where none is without: they hold for its servo too.
 
-    A servo's time is told by the equations that the control is in. That of the aileron may be ``swapped`` with the roll
-    mode's.
+    A servo's time is told by the equations that the control is in. No time is told by a control whose effect may be
+    nothing. That of the aileron may be ``swapped`` with the roll mode's.
     """
     imperfect, table, layout = state.model.imperfections, state.model.table, state.model.layout
     if imperfect is None:
         return np.zeros(0, np.uint8)
     regressors, found = np.array(state.equations.structure.regressors), np.zeros(imperfect.timed.size, np.uint8)
+    felt = _felt(state, latest)
     for i, place in enumerate(imperfect.timed.tolist()):
         of_it = objections[(regressors[table.unknown] == layout.timed[place]) & ~table.offset]
         if of_it.size and (of_it != status.OK).all():
             found[i] = of_it[-1]
+        if not felt[regressors == layout.timed[place]].any():
+            found[i] = found[i] or status.CONVERGING
         if swapped and layout.timed[place] == roll_mode_exchange.CONTROL:
             found[i] = status.CONVERGING
     return found
+
+
+def _felt(state: EstimatorState, latest: SegmentSolution) -> Flags:
+    """(P,) whether some derivative with respect to a regressor is surely not zero: 95 % intervals without it.
+
+    A moment's derivative, where there is one: forces are told worse.
+    """
+    solution, structure = latest.solution, state.equations.structure
+    slopes, size = solution.theta.T, np.abs(solution.inverse.diagonal())
+    variances = slope_variances(latest, solution.residual, size, 1.0)
+    if latest.systematic is not None:
+        slopes = slopes + latest.systematic.correction[:, :-1]
+        variances = variances + latest.systematic.variance[:, :-1]
+    belongs = structure.belongs.T > 0.0
+    of_moments = belongs & np.isin(structure.coefficients, MOMENTS)[:, None]
+    judged = np.where(of_moments.any(axis=0), of_moments, belongs)
+    return np.asarray((judged & (np.abs(slopes) > NORMAL_95 * np.sqrt(np.maximum(variances, 0.0)))).any(axis=0))
 
 
 def _systematic(state: EstimatorState, latest: SegmentSolution) -> Array:
