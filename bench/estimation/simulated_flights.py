@@ -23,8 +23,8 @@ from sysid_node.dynamics.atmosphere import air_density
 from sysid_node.excite.spec import parse_manoeuvre
 from sysid_node.online.types import SAMPLE_COLUMNS
 from sysid_node.sim import Simulator, trim_flight
-from sysid_node.sim.flying.attitude_loops import AttitudeLoops
-from sysid_node.sim.flying.autopilot import Autopilot, autopilot_for, fly_held
+from sysid_node.sim.flying.attitude_loops import AttitudeLoops, autopilot_with
+from sysid_node.sim.flying.autopilot import Autopilot, fly_held
 from sysid_node.sim.flying.rollout import RolloutInputs, SimulatedFlight
 from sysid_node.sim.flying.trim import Trim
 from sysid_node.sim.model.layout import OUTPUTS
@@ -130,9 +130,7 @@ def fly(aircraft: str, setting: Setting, seeds: Sequence[int]) -> Batch:
 
 def _pilot(simulator: Simulator, trim: Trim, setting: Setting) -> Autopilot:
     """The autopilot with the setting's loops and so many times their gains; its authority stays."""
-    pilot = autopilot_for(simulator, trim)
-    if setting.loops is not None:
-        pilot = setting.loops.flown_by(pilot, simulator.commands)
+    pilot = autopilot_with(setting.loops, simulator, trim)
     return pilot._replace(gains=setting.stiffness * pilot.gains, integral=setting.stiffness * pilot.integral)
 
 

@@ -33,7 +33,7 @@ SECONDS = 120.0
 Counts = tuple[int, int, int, int]
 Loops = tuple[AttitudeLoops | None, float]  # none: the simulator's own; times their gains
 
-#: With the least time constant that PX4 and ArduPilot recommend, and a rate that is answered as much as a demand.
+#: With the least time constant that ArduPilot recommends, and a rate that is answered as much as a demand.
 TIGHT = AttitudeLoops("tight", 0.4, RateLoop(1.0, 0.43), RateLoop(1.0, 0.39))
 
 AUTOPILOTS: dict[str, Loops] = {

@@ -77,9 +77,7 @@ def add_parser(commands: Commands) -> argparse.ArgumentParser:
     held = parser.add_mutually_exclusive_group().add_argument
     held("--open-loop", dest="autopilot", action="store_false", help="without the autopilot")
     held("--autopilot", action="store_true", default=True, help="hold attitude and airspeed (default)")
-    add(
-        "--loops", choices=LOOPS, default=LOOPS[0], help="the autopilot's in roll and pitch (default: own, softer ones)"
-    )
+    add("--loops", choices=LOOPS, default=LOOPS[0], help="the autopilot's attitude loops (default: own, softer ones)")
     add("--noise", type=float, default=_NOISE, help="of the aircraft file's sensor noise (default: 1)")
     add("--rate", type=float, default=200.0, help="of the IMU, Hz (default: 200)")
     add("--air-data-rate", type=float, default=100.0, help="Hz (default: 100)")

@@ -103,9 +103,9 @@ def _of_servos(state: EstimatorState, latest: SegmentSolution, objections: Codes
 
 
 def _felt(state: EstimatorState, latest: SegmentSolution) -> Flags:
-    """(P,) whether some derivative with respect to a regressor is surely not zero: 95 % intervals without it.
+    """(P,) whether the 95 % interval of some derivative with respect to a regressor does not hold zero.
 
-    A moment's derivative, where there is one: forces are told worse.
+    It must be a moment's derivative where there is one, because the moments tell the time of a control best.
     """
     solution, structure = latest.solution, state.equations.structure
     slopes, size = solution.theta.T, np.abs(solution.inverse.diagonal())

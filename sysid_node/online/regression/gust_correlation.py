@@ -35,6 +35,7 @@ from sysid_node.online.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
+#: Both were chosen so that intervals hold under the default loops of PX4 and ArduPilot (``stiff_autopilots`` in bench).
 ALLOWED = 0.07  # correlation between instruments and gusts, where surfaces are moved on purpose
 ANSWERED = 0.3  # that correlation where the gusts' moments have the energy of the moments by deflections
 MOMENTS = ("Cl", "Cm", "Cn")

@@ -5,15 +5,17 @@ Both demand a rate that takes away the error of the attitude within a time const
     F demanded rate + P (demanded rate - rate) + I integral of (demanded rate - rate) dt .
 
 Tuning guides of both set the feedforward F so that the aircraft turns as fast as is demanded: it is the reciprocal of
-the aircraft's steady response. The other gains are taken as shares of F, as their default values are. The rudder and
-the thrust are those of the simulator's own autopilot, which damps yaw; ArduPilot does not by default.
+the aircraft's steady response. The other gains are taken as shares of F, as their default values are. Rudder and
+thrust are commanded as by the simulator's own autopilot. Other releases of both have other gains.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sysid_node.sim.flying.autopilot import BANDWIDTH, SEEN, Autopilot
+from sysid_node.sim.flying.autopilot import BANDWIDTH, SEEN, Autopilot, autopilot_for
+from sysid_node.sim.flying.trim import Trim
+from sysid_node.sim.simulator import Simulator
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,12 @@ class AttitudeLoops:
             gains = gains.at[row, turned].set(feedforward * loop.proportional)
             integral = integral.at[row, held].set(feedforward * loop.integral / self.time_constant)
         return pilot._replace(gains=gains, integral=integral)
+
+
+def autopilot_with(loops: AttitudeLoops | None, simulator: Simulator, trim: Trim) -> Autopilot:
+    """The autopilot that holds this trim, with these ``loops``; none: with the simulator's own."""
+    own = autopilot_for(simulator, trim)
+    return own if loops is None else loops.flown_by(own, simulator.commands)
 
 
 #: ``fw_att_control_params.c``: FW_R_TC and FW_P_TC 0.4 s; FW_RR_FF 0.5, FW_RR_P 0.05, FW_RR_I 0.01; FW_PR_FF 0.5,

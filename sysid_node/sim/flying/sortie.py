@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sysid_node.errors import InputError
-from sysid_node.sim.flying.attitude_loops import AttitudeLoops
-from sysid_node.sim.flying.autopilot import autopilot_for, fly_held
+from sysid_node.sim.flying.attitude_loops import AttitudeLoops, autopilot_with
+from sysid_node.sim.flying.autopilot import fly_held
 from sysid_node.sim.flying.rollout import RolloutInputs, SimulatedFlight
 from sysid_node.sim.flying.trim import Trim, trim_flight
 from sysid_node.sim.model.layout import OUTPUTS
@@ -84,9 +84,7 @@ def fly_sortie(simulator: Simulator, deflections: Array, conditions: SortieCondi
     _check_travel(simulator, commands)
     inputs = _inputs(simulator, trim, commands, conditions)
     if conditions.autopilot:
-        pilot = autopilot_for(simulator, trim)
-        if conditions.loops is not None:
-            pilot = conditions.loops.flown_by(pilot, simulator.commands)
+        pilot = autopilot_with(conditions.loops, simulator, trim)
         flight = fly_held(simulator, theta, trim, inputs, pilot, given)
     else:
         flight = simulator.rollout(theta, trim.initial, inputs)
