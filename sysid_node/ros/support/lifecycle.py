@@ -116,6 +116,8 @@ class CarefulNode(LifecycleNode):
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
         except Exception as error:
+            if not self.context.ok():  # interrupted: whatever it was about to do fails, which is no fault
+                return TransitionCallbackReturn.ERROR
             self._record(work.__name__, error)
             return TransitionCallbackReturn.ERROR
 
